@@ -14,7 +14,6 @@
 #include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_discrepancy/explain/explain.h"
 #include "smartmill_discrepancy/gap/gap.h"
-#include "smartmill_discrepancy/report/pictures.h"
 #include "smartmill_discrepancy/report/report_html.h"
 #include "smartmill_discrepancy/report/report_json.h"
 #include "smartmill_discrepancy/report/summary.h"
@@ -68,7 +67,7 @@ py::object toPython(const FoundEffect& effect) {
     if (p.modulo > 0.0) modulo[p.key.c_str()] = p.modulo;
   }
   py::dict alternatives;
-  for (const auto& [name, delta_bic] : effect.alternatives) alternatives[name.c_str()] = delta_bic;
+  for (const Rival& rival : effect.alternatives) alternatives[rival.name.c_str()] = rival.delta_bic;
   return make("Effect", effect.name, effect.variant, effect.words, parameters, modulo, effect.confidence,
               effect.delta_bic, effect.heldout_gap_reduction, alternatives);
 }
@@ -142,8 +141,7 @@ py::object explainCampaign(const std::string& path, const std::optional<MachineM
     work.check();
     if (report) {
       writeReport(explanation, out);
-      writeHtml(explanation, std::filesystem::path(path).filename().string(), drawPictures(explanation, out),
-                out);
+      writeHtml(explanation, path, out);
     }
     work.progress(1.0);
     return explanation;

@@ -33,14 +33,15 @@ std::string toolOf(const std::string& command) {
   return "false";
 }
 
-/// Without wall times: "seconds" in report.json, their column and sum in report.html, the speed of
-/// compensate.
+/// Without wall times and folders: "seconds" in report.json; their sum, their column and the path of the
+/// model in report.html; the speed of compensate.
 std::string withoutTimes(const std::string& file, std::string text) {
   if (file.empty()) text = std::regex_replace(text, std::regex("in [0-9.]+ s, [0-9]+ x real time"), "");
   if (file.find("report.json") != std::string::npos)
     text = std::regex_replace(text, std::regex("\"seconds\": [-+.e0-9]+"), "\"seconds\"");
   if (file.find("report.html") != std::string::npos) {
-    text = std::regex_replace(text, std::regex("<p>[0-9]+ s\\.</p>"), "");
+    text = std::regex_replace(text, std::regex("It took [0-9]+ s"), "");
+    text = std::regex_replace(text, std::regex("(model|folder):=[^ <]+"), "");
     text = std::regex_replace(text, std::regex("<td>[0-9]+<td>[0-9]+\\.[0-9]</tr>"), "");
   }
   return text;

@@ -16,7 +16,6 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/inspection_file.h"
 #include "smartmill_discrepancy/explain/explain.h"
-#include "smartmill_discrepancy/report/pictures.h"
 #include "smartmill_discrepancy/report/report_html.h"
 #include "smartmill_discrepancy/report/report_json.h"
 #include "smartmill_discrepancy/report/summary.h"
@@ -89,8 +88,7 @@ int run(const Arguments& arguments) {
     explanation.notes.insert(explanation.notes.end(), notes.begin(), notes.end());
   }
   writeReport(explanation, arguments.out);
-  writeHtml(explanation, std::filesystem::path(arguments.campaign).filename().string(),
-            drawPictures(explanation, arguments.out), arguments.out);
+  writeHtml(explanation, arguments.campaign, arguments.out);
   std::cout << summaryOf(explanation);
   return explanation.interrupted ? INTERRUPTED : 0;
 }
@@ -106,7 +104,7 @@ Command explainCommand() {
   command.examples = {{"campaigns/runout -o report", "searches a campaign; report/report.html is the result"},
                       {"session.bag --model mill.yaml -o report --budget 0",
                        "the same for a recorded session, without a limit of its time"}};
-  command.files = {{"OUT/report.html", "the report with its pictures"},
+  command.files = {{"OUT/report.html", "the report for the machine: causes, what to do, next test"},
                    {"OUT/report.json", "the report for programs"},
                    {"OUT/model.yaml", "the model with the effects found"}};
   command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the report contains the effects found until then"}};

@@ -120,9 +120,16 @@ MachineModel describeModel(Workbench& bench, const SearchOptions& options, const
   for (const Candidate& r : found.candidates) result->candidates.push_back(r.result);
   MachineModel improved = nameEffects(bench, options, found, result);
   bench.clearWhitening();
-  for (std::size_t m = 0; m < result->effects.size(); ++m)
-    result->effects[m].heldout_gap_reduction =
-        heldoutReduction(bench, found.best.state, found.without_member[m]);
+  const auto gapOf = [&](const FitState& state) { return heldoutGap(bench, bench.exact().model(state)); };
+  for (std::size_t m = 0; m < result->effects.size(); ++m) {
+    FoundEffect& effect = result->effects[m];
+    effect.heldout_gap_reduction = heldoutReduction(bench, found.best.state, found.without_member[m]);
+    effect.heldout_without = gapOf(found.without_member[m]);
+    auto rival = effect.alternatives.begin();
+    for (const Alternative& alternative : found.alternatives) {
+      if (alternative.member == m) (rival++)->heldout_gap = gapOf(alternative.state);
+    }
+  }
   return improved;
 }
 
@@ -138,16 +145,27 @@ std::vector<std::string> effectsOf(const std::vector<const Hypothesis*>& hypothe
 // All of them as one group, and the test that separates one of them best.
 void reportEquivalents(const std::vector<Equivalent>& equivalents, Explanation* result) {
   std::vector<std::string> group;
-  const SeparatingTest* best = nullptr;
+  const Equivalent* best = nullptr;
   for (const Equivalent& one : equivalents) {
     if (std::find(group.begin(), group.end(), one.effect) == group.end()) group.push_back(one.effect);
-    if (one.test && (!best || one.test->difference > best->difference)) best = &*one.test;
+    if (one.test && (!best || one.test->difference > best->test->difference)) best = &one;
   }
   if (!group.empty()) result->not_separable.push_back(std::move(group));
-  if (best && best->difference > MIN_SEPARATION) {
-    result->suggested_test = best->text;
-    result->suggested_cut = best->test;
+  if (best && best->test->difference > MIN_SEPARATION) {
+    result->suggested_test = best->test->text;
+    result->suggested_cut = best->test->test;
+    result->outcome = best->test->outcome;
+    result->outcome->second = best->effect;
   }
+}
+
+void addTests(const Dataset& data, Explanation* result) {
+  const auto add = [&](const TestData& t, bool left_out) {
+    result->tests.push_back(
+        {t.test, static_cast<double>(t.record.size()) / t.test.sample_rate, t.heldout, left_out});
+  };
+  for (const TestData& t : data.tests) add(t, false);
+  for (const ChatteringTest& t : data.chattering) add(t.data, true);
 }
 
 void noteToothPath(const MachineModel& model, Explanation* result) {
@@ -170,6 +188,9 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const auto begin = std::chrono::steady_clock::now();
   Explanation result;
   result.notes = data.notes;
+  result.nominal = data.nominal;
+  result.noise = data.noise;
+  addTests(data, &result);
   const Labels labels = checkLabels(data, options.bench.threads);
   throwIfAny(data, labels.wrong);
 
@@ -193,6 +214,9 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   budget.beginStage(ends.search);
   SearchResult found = search(bench, hypotheses, search_options);
   result.not_tried = effectsOf(found.not_tried);
+  std::vector<const Hypothesis*> testable;
+  for (const Hypothesis& h : hypotheses) testable.push_back(&h);
+  result.testable = effectsOf(testable).size();
 
   // The part of the residual that calibrated nominal values remove is not a disagreement.
   StructureOptions structure = options.structure;
@@ -222,6 +246,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const GapPair after = residualOf(bench, improved).gap;
   if (after.fit <= before.gap.fit && after.heldout <= before.gap.heldout) {
     result.sentence = sentenceOf(result);
+    result.calibrated = calibratedValues(bench.freedom(), found.best);
     if (named_only) result.named_only = residualOf(bench, bench.exact().model(*named_only)).gap;
     withdrawNotValidated(found, &result);
   } else {

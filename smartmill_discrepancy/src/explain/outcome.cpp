@@ -69,6 +69,10 @@ ModelResidual residualOf(const Workbench& bench, const MachineModel& model) {
   return r;
 }
 
+double heldoutGap(const Workbench& bench, const MachineModel& model) {
+  return gapOf(bench.heldout(), residualOf(bench.heldout(), model));
+}
+
 void writeOutcome(const Workbench& bench, const ModelResidual& before, const MachineModel& improved,
                   const std::string& folder, Explanation* result) {
   const std::string file = folder + "/model.yaml";

@@ -44,7 +44,7 @@ double commonFactor(const std::vector<RecalibratedValue>& values) {
 
 }  // namespace
 
-std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom, const FitResult& fit) {
+std::vector<RecalibratedValue> calibratedValues(const NominalFreedom& freedom, const FitResult& fit) {
   std::vector<RecalibratedValue> values;
   for (std::size_t c = 0; c < fit.state.nominal.size(); ++c) {
     const std::optional<double> stated = freedom.stated(c);
@@ -58,6 +58,11 @@ std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom,
   std::stable_sort(values.begin(), values.end(), [](const RecalibratedValue& a, const RecalibratedValue& b) {
     return std::abs(a.deviations) > std::abs(b.deviations);
   });
+  return values;
+}
+
+std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom, const FitResult& fit) {
+  std::vector<RecalibratedValue> values = calibratedValues(freedom, fit);
   if (values.empty()) return values;
   const double least = LIMITS.share * std::abs(values.front().deviations);
   const auto isListed = [least](const RecalibratedValue& v) {

@@ -148,7 +148,11 @@ void addAlternatives(const Workbench& bench, const SearchOptions& options, const
       effect->confidence =
           std::min(effect->confidence, validate(bench, best, alternative.state).confidence());
     };
-    effect->alternatives.emplace_back(alternative.effect, alternative.delta_bic);
+    const Member& rival = alternative.state.members.back();
+    std::vector<FoundParameter> parameters;
+    for (const auto& [key, value] : numbersOf(rival.hypothesis->entry(rival.values)))
+      parameters.push_back({key, value, 0.0, 0.0});
+    effect->alternatives.push_back({alternative.effect, alternative.delta_bic, parameters, {}});
     // A gain too small for naming an effect does not separate it from another.
     const double threshold = std::min(options.min_gain, limits.separating_share * effect->delta_bic);
     const double gain = effect->delta_bic - alternative.delta_bic;
@@ -185,6 +189,9 @@ void reportUnidentifiable(const std::vector<UnidentifiablePair>& unidentifiable,
   if (const UnidentifiablePair* const informative = mostInformative(unidentifiable, prior)) {
     result->suggested_test = informative->test->text;
     result->suggested_cut = informative->test->test;
+    result->outcome = informative->test->outcome;
+    result->outcome->first = informative->name;
+    result->outcome->second = informative->alternative;
     return;
   }
   for (const UnidentifiablePair& pair : unidentifiable) {
@@ -223,7 +230,8 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
     }
     writeStdDevs(entry, effect.parameters);
     effect.delta_bic = found.contribution[m];
-    effect.confidence = validate(bench, best.state, found.without_member[m]).confidence();
+    effect.presence = validate(bench, best.state, found.without_member[m]).confidence();
+    effect.confidence = effect.presence;
     addAlternatives(bench, options, found, m, &effect, &unidentifiable);
     result->effects.push_back(std::move(effect));
   }

@@ -1,222 +1,608 @@
 #include "smartmill_discrepancy/report/report_html.h"
 
 #include <algorithm>
-#include <map>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
 #include <ostream>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/report_page.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/report/shop_quantity.h"
+#include "smartmill_discrepancy/report/shop_text.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-std::string number(double value, const char* format = "%.4g") {
-  return formatted(format, value);
+/// [1] of the remaining difference: smaller components are not listed.
+constexpr double LEAST_SHARE = 0.01;
+/// In a note on an effect of the catalogue that the records cannot show, between its name and the reason.
+const std::string NOT_TESTED = " is not tested: ";
+/// [1] Difference, times the noise, up to which only noise remains.
+constexpr double ONLY_NOISE = 1.01;
+
+std::string times(double difference) {
+  return formatted(difference < 10.0 ? "%.2f" : difference < 100.0 ? "%.1f" : "%.0f", difference);
 }
 
-void findings(std::ostream& out, const char* title, const std::vector<Finding>& list) {
-  if (list.empty()) return;
-  out << "<h2>" << title
-      << "</h2>\n<table><tr><th>channel<th>domain<th>where<th>largest amplitude<th>share of the gap<th>false "
-         "discovery rate<th>depends on<th>tests</tr>\n";
-  for (const Finding& f : list) {
-    out << "<tr><td>" << f.channel << "<td>" << f.domain << "<td>";
-    for (const auto& [key, value] : f.location) out << key << " " << number(value, "%.5g") << " ";
-    out << "<td>" << number(f.amplitude) << "<td>" << number(f.share_of_gap) << "<td>"
-        << number(f.p_value, "%.1e") << "<td>" << joined(f.depends_on) << "<td>" << f.tests.size() << ": "
-        << escapedHtml(joined(f.tests)) << "</tr>\n";
+std::string counted(std::size_t count, const char* one, const char* several) {
+  return std::to_string(count) + " " + (count == 1 ? one : several);
+}
+
+std::string percentText(double share) {
+  const double percent = 100.0 * share;
+  return percent > 99.9 && percent < 100.0 + 1e-9 ? "> 99.9 %" : formatted("%.3g %%", percent);
+}
+
+std::string unitHtml(const std::string& unit) {
+  if (unit == "1") return "";
+  if (unit == "deg") return "&deg;";
+  std::string text = " " + escapedHtml(unit);
+  for (std::size_t at = 0; (at = text.find("um", at)) != std::string::npos; at += 7)
+    text.replace(at, 2, "&micro;m");
+  return text;
+}
+
+std::string sizeText(const ShopQuantity& q) {
+  return q.name + " <b>" + intervalText(q.value, q.std_dev) + unitHtml(q.unit) + "</b>" +
+         (q.modulo > 0.0
+              ? formatted(" (plus multiples of %.4g&deg;: no record has a spindle angle)", q.modulo)
+              : "");
+}
+
+std::string namedCause(const std::string& effect) {
+  const EffectKind& kind = *findEffect(effect);
+  return "<b>" + escapedHtml(causeTitle(effect)) + "</b>" +
+         (kind.empirical() ? "" : " <span class=\"dim\">(" + effect + ")</span>");
+}
+
+bool isRival(const Explanation& e, const std::string& effect, const std::string& other) {
+  return effect != other && standsFor(e, effect, other);
+}
+
+bool hasRivals(const Explanation& e, const std::string& effect) {
+  return std::any_of(e.not_separable.begin(), e.not_separable.end(), [&](const auto& group) {
+    return std::find(group.begin(), group.end(), effect) != group.end();
+  });
+}
+
+std::size_t heldoutTests(const Explanation& e) {
+  return static_cast<std::size_t>(
+      std::count_if(e.tests.begin(), e.tests.end(), [](const ReportedTest& t) { return t.heldout; }));
+}
+
+void list(std::ostream& out, const char* title, const std::vector<std::string>& items) {
+  if (!items.empty())
+    out << "<h2>" << title << "</h2>\n<ul><li>" << joined(items, "</li><li>") << "</li></ul>\n";
+}
+
+void head(std::ostream& out, const Explanation& e) {
+  std::vector<std::string> facts;
+  if (e.nominal.tool) {
+    const ToolGeometry& tool = *e.nominal.tool;
+    facts.push_back(formatted("Tool: %d %s, diameter %.4g mm, helix angle %.3g&deg;", tool.teeth,
+                              tool.teeth == 1 ? "tooth" : "teeth", tool.diameter / units::MM,
+                              units::degFromRad(tool.helix)));
   }
-  out << "</table>\n";
+  const bool states_material = e.nominal.workpiece && !e.nominal.workpiece->material.empty();
+  facts.push_back("Material: " + (states_material ? escapedHtml(e.nominal.workpiece->material)
+                                                  : std::string("not stated in the model")));
+  facts.push_back(formatted("%zu tests, %zu of them held out", e.tests.size(), heldoutTests(e)));
+  out << "<p class=\"dim\">" << joined(facts, " &middot; ") << "</p>\n<p class=\"verdict\">" << verdictText(e)
+      << "</p>\n";
+  if (e.verdict == Verdict::recalibrated) out << "<p>" << escapedHtml(e.sentence) << "</p>\n";
 }
 
-const char* sentenceOf(Verdict verdict) {
-  static const std::map<Verdict, const char*> SENTENCES{
-      {Verdict::no_disagreement, "Model and records agree within the noise."},
-      {Verdict::recalibrated,
-       "No effect is missing: with the values below in place of the stated ones, model and records agree."},
-      {Verdict::explained, "The effects below explain the difference between model and records."},
-      {Verdict::partly_explained,
-       "The effects below explain a part of the difference; the rest is not in the catalogue."},
-      {Verdict::unknown_effect,
-       "Model and records differ, and no effect of the catalogue explains the difference."}};
-  return SENTENCES.at(verdict);
+// ---- causes
+
+std::string sureText(const Explanation& e, const FoundEffect& f) {
+  const bool rivals = hasRivals(e, f.name);
+  std::string text = (rivals ? "one of them is present: " : "") + std::string("probability <b>") +
+                     percentText(rivals ? f.presence : f.confidence) + "</b>";
+  if (f.heldout_without > 0.0)
+    text += ". Held-out tests: difference " + times(f.heldout_without) + " times the noise without it, " +
+            times(e.after.heldout) + " with it";
+  return text + ".";
 }
 
-const std::map<std::string, std::string> CAPTIONS{
-    {"gaps.png", "Gap of every test and channel before and after"},
-    {"candidates.png", "BIC gain of the candidates"},
-    {"residual.png", "Gap after, test by test"}};
-
-void verdict(std::ostream& out, const Explanation& e) {
-  out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
-  if (!e.sentence.empty()) out << "<p><b>" << escapedHtml(e.sentence) << "</b></p>\n";
-  if (e.interrupted) out << "<p>The search was interrupted: effects found until then.</p>\n";
-  if (e.spent_budget)
-    out << "<p>The search was ended by its budget of " << number(*e.spent_budget)
-        << " s: effects found until then.</p>\n";
-  if (!e.not_tried.empty()) out << "<p>Not tried: " << joined(e.not_tried) << ".</p>\n";
-  out << "<table><tr><th>difference, as a multiple of the noise<th>before<th>after</tr><tr><td>tests used to "
-         "find the cause<td>"
-      << number(e.before.fit) << "<td>" << number(e.after.fit) << "</tr><tr><td>held-out tests<td>"
-      << number(e.before.heldout) << "<td>" << number(e.after.heldout)
-      << "</tr></table>\n<p>This gap is the RMS of measured minus simulated values over the noise; at 1 only "
-         "noise is "
-         "left.</p>\n";
-}
-
-void recalibrated(std::ostream& out, const std::vector<RecalibratedValue>& values) {
-  if (values.empty()) return;
-  out << "<h2>Values of the model</h2>\n<table><tr><th>value<th>stated<th>from the "
-         "records<th>change<th>stated "
-         "deviations</tr>\n";
-  for (const RecalibratedValue& v : values)
-    out << "<tr><td>" << v.name << "<td>" << number(v.before, "%.5g") << "<td>" << number(v.after, "%.5g")
-        << " &plusmn; " << number(v.std_dev, "%.2g") << "<td>"
-        << number(100.0 * (v.after / v.before - 1.0), "%+.2f %%") << "<td>" << number(v.deviations, "%+.1f")
-        << "</tr>\n";
-  out << "</table>\n";
-}
-
-// A key of an effect as a machinist reads it, with its unit.
-std::string sizeOf(const FoundEffect& effect, const FoundParameter& p) {
-  const EffectParameter& parameter = parameterOf(*findEffect(effect.name), p.key);
-  const bool is_item = p.key.find('[') != std::string::npos;  // of a list: the key says which
-  return (is_item ? p.key : parameter.quantity()) + " " + number(p.known(), "%.5g") + " &plusmn; " +
-         number(p.std_dev, "%.2g") +
-         (is_item || parameter.unit == "1" ? "" : " " + escapedHtml(parameter.unit)) +
-         (p.modulo > 0.0 ? " (plus multiples of " + number(p.modulo) + ")" : "") + "<br>";
-}
-
-std::string titleOf(const std::string& effect) {
-  std::string title = effect;
-  std::replace(title.begin(), title.end(), '_', ' ');
-  return title;
-}
-
-std::string certaintyOf(double confidence) {
-  constexpr double NEARLY = 0.999;
-  return confidence > NEARLY ? "above 99.9 %" : number(100.0 * confidence, "%.3g %%");
-}
-
-void effects(std::ostream& out, const Explanation& e) {
-  if (!e.effects.empty()) {
-    out << "<h2>What the machine has and the model lacks</h2>\n<table><tr><th>effect<th>what it does<th>how "
-           "large<th>how "
-           "sure<th>what else it may be</tr>\n";
-    for (const FoundEffect& f : e.effects) {
-      out << "<tr><td><b>" << titleOf(f.name) << "</b>";
-      for (const auto& [key, word] : f.words) out << "<br>" << key << " " << escapedHtml(word);
-      out << "<td>" << escapedHtml(findEffect(f.name)->description) << "<td>";
-      for (const FoundParameter& p : f.parameters) out << sizeOf(f, p);
-      std::string others;
-      for (const auto& group : e.not_separable) {
-        if (std::find(group.begin(), group.end(), f.name) == group.end()) continue;
-        for (const std::string& other : group) {
-          if (other != f.name) others += (others.empty() ? "" : ", ") + titleOf(other);
-        }
-      }
-      out << "<td>" << certaintyOf(f.confidence)
-          << (others.empty() ? "; removes " : ", this or what else it may be; removes ")
-          << number(100.0 * f.heldout_gap_reduction, "%.0f %%")
-          << " of the difference in cuts that were not used to find it<td>"
-          << (others.empty() ? "nothing in the catalogue fits as well" : others + ": these records fit both")
-          << "</tr>\n";
-    }
-    out << "</table>\n";
+// Of the causes that were compared in the round of an effect the one that explains most in its place.
+std::string nearestText(const Explanation& e, const FoundEffect& f) {
+  const CandidateResult *own = nullptr, *nearest = nullptr;
+  for (const CandidateResult& t : e.candidates) {
+    if (t.effect == f.name && t.accepted) own = &t;
   }
-  for (const Resemblance& r : e.resembles) {
-    out << "<p>Not named: <b>" << titleOf(r.name) << "</b>"
+  for (const CandidateResult& t : e.candidates) {
+    if (own && t.round == own->round && t.effect != f.name && !t.accepted && t.delta_bic > 0.0 &&
+        (!nearest || t.delta_bic > nearest->delta_bic))
+      nearest = &t;
+  }
+  if (!nearest) return "None of the other causes that were checked explains it. ";
+  return "Nearest of the others that were checked: " + namedCause(nearest->effect) +
+         formatted(", which explains %.2g %% of what this cause explains. ",
+                   100.0 * nearest->delta_bic / own->delta_bic);
+}
+
+std::string rivalsText(const Explanation& e, const FoundEffect& f, const ShopConditions& conditions) {
+  std::string text;
+  for (const Rival& r : f.alternatives) {
+    const bool equal = isRival(e, f.name, r.name);
+    text += namedCause(r.name) + ", ";
+    const std::vector<ShopQuantity> sizes = shopQuantities(r.name, r.parameters, conditions);
+    if (!sizes.empty()) text += sizeText(sizes.front());
+    text += equal ? ": <b>these tests fit both</b>" : ": fits less well";
+    if (r.heldout_gap > 0.0)
+      text += " (held-out tests: difference " + times(r.heldout_gap) + " times the noise)";
+    text += ".<br>";
+  }
+  if (f.alternatives.empty()) text = nearestText(e, f);
+  return text + (e.not_tried.empty()
+                     ? ""
+                     : counted(e.not_tried.size(), "cause was", "causes were") + " not checked (appendix).");
+}
+
+// The unit on the channel of an effect, of one that acts on forces or on the load meter: "N or V".
+std::string unitOn(const FoundEffect& f, const std::string& unit) {
+  const std::size_t between = unit.find(" or ");
+  if (between == std::string::npos) return unit;
+  const auto channel = f.words.find("channel");
+  const bool is_force = channel == f.words.end() || channel->second != "load_meter";
+  return is_force ? unit.substr(0, between) : unit.substr(between + 4);
+}
+
+void notNamed(std::ostream& out, const Explanation& e) {
+  for (const Resemblance& r : e.resembles)
+    out << "<p>Considered, but not accepted: " << namedCause(r.name)
         << (r.variant.empty() ? "" : " (" + escapedHtml(r.variant) + ")") << ", " << escapedHtml(r.reason)
         << ".</p>\n";
-  }
 }
 
-// What to do now, the most useful first.
-void nextSteps(std::ostream& out, const Explanation& e) {
+void causes(std::ostream& out, const Explanation& e) {
+  if (e.effects.empty()) return;
+  const ShopConditions conditions = conditionsOf(e.tests);
+  out << "<h2>Causes: what the machine has and the supplied model lacks</h2>\n<table "
+         "class=\"stack\"><tr><th>cause<th>how "
+         "large<th>how sure<th>what else it can be</tr>\n";
+  for (const FoundEffect& f : e.effects) {
+    out << "<tr><td>" << namedCause(f.name);
+    for (const auto& [key, word] : f.words) out << "<br>" << key << ": " << escapedHtml(word);
+    out << "<td>";
+    for (ShopQuantity& q : shopQuantities(f.name, f.parameters, conditions)) {
+      q.unit = unitOn(f, q.unit);
+      out << sizeText(q) << "<br>";
+    }
+    out << "<td>" << sureText(e, f) << "<td>" << rivalsText(e, f, conditions) << "</tr>\n";
+  }
+  out << "</table>\n<p class=\"dim\">&plusmn; is the 95 % interval. Spindle angle 0: tooth 1 points to +y; "
+         "the spindle "
+         "turns clockwise, seen from above. Probability: that the cause also reduces the difference in "
+         "further "
+         "tests.</p>\n";
+}
+
+void values(std::ostream& out, const char* title, const std::vector<RecalibratedValue>& list) {
+  if (list.empty()) return;
+  out << "<h2>" << title
+      << "</h2>\n<table><tr><th>value (key in model.yaml)<th>supplied model<th>corrected "
+         "model<th>change<th>change over "
+         "the stated uncertainty</tr>\n";
+  for (const RecalibratedValue& v : list)
+    out << "<tr><td>" << v.name << "<td>" << formatted("%.5g", v.before) << "<td>"
+        << intervalText(v.after, v.std_dev) << "<td>"
+        << formatted("%+.2f %%", 100.0 * (v.after / v.before - 1.0)) << "<td>"
+        << formatted("%+.1f", v.deviations) << "</tr>\n";
+  out << "</table>\n";
+}
+
+// ---- actions
+
+std::string kindText(const CampaignTest& test) {
+  if (test.kind == TestKind::tap) return "tap " + test.direction;
+  if (!test.engagement) return test.kind == TestKind::air ? "air cut" : testKindName(test.kind);
+  constexpr double NEAR = 1e-6;
+  const bool from_zero = test.engagement->entry<NEAR, to_half_turn = test.engagement->exit> units::PI - NEAR;
+  return from_zero && to_half_turn ? "slot"
+         : from_zero               ? "up-milling"
+         : to_half_turn            ? "down-milling"
+                                   : "cut";
+}
+
+std::string cutText(const CampaignTest& test) {
+  const std::string text =
+      kindText(test) + formatted(", %.0f rpm", units::rpmFromRadPerSec(test.spindle_speed));
+  if (!test.engagement) return text;
+  const Engagement& c = *test.engagement;
+  return text + formatted(", feed %.3g mm per tooth, depth %.3g mm, immersion %.0f&deg; to %.0f&deg;",
+                          c.feed_per_tooth / units::MM, c.axial_depth / units::MM, units::degFromRad(c.entry),
+                          units::degFromRad(c.exit));
+}
+
+std::string outcomeText(const TestOutcome& o) {
+  constexpr double DISTINCT = 0.02;  // of the peak, to be read off a display
+  const std::string first = o.first.empty() ? "wrong values of the model" : causeTitle(o.first);
+  const ChannelWords words = channelWords(o.channel);
+  std::string text;
+  if (std::abs(o.peak - o.other_peak) > DISTINCT * std::max(o.peak, o.other_peak))
+    text = "Peak of " + words.title + " near <b>" + words.text(o.peak) + "</b>: " + first + "; near <b>" +
+           words.text(o.other_peak) + "</b>: " + causeTitle(o.second) + ". ";
+  else
+    text =
+        "Both causes give nearly the same peak; only the shape of the signals differs, so that the next "
+        "search "
+        "decides. ";
+  return text + (o.chatters ? "<b>The model predicts chatter in this cut: approach it with less depth.</b> "
+                            : "The model predicts no chatter. ");
+}
+
+// What decides without a cut: the sizes that a shop measures, of a cause and its rival.
+std::string measuredInstead(const Explanation& e) {
+  const ShopConditions conditions = conditionsOf(e.tests);
+  std::vector<std::string> parts;
+  for (const FoundEffect& f : e.effects) {
+    for (const Rival& r : f.alternatives) {
+      if (!isRival(e, f.name, r.name)) continue;
+      for (const auto& [name, parameters] :
+           {std::pair(f.name, f.parameters), std::pair(r.name, r.parameters)}) {
+        const std::vector<ShopQuantity> sizes = shopQuantities(name, parameters, conditions);
+        if (!sizes.empty()) parts.push_back(causeTitle(name) + ": " + sizeText(sizes.front()));
+      }
+    }
+  }
+  return parts.empty() ? ""
+                       : "<p>Or measure at the machine. If it is " + joined(parts, "; if it is ") + ".</p>\n";
+}
+
+std::string command(const std::string& line) {
+  return "<pre>" + escapedHtml(line) + "</pre>";
+}
+
+std::string searchCommand(const std::string& campaign, const std::string& folder, bool is_whole) {
+  return command("smartmill explain " + campaign + " -o " + folder + (is_whole ? " --budget 0" : ""));
+}
+
+void nextTest(std::ostream& out, const Explanation& e, const std::string& campaign,
+              const std::string& folder) {
+  out << "<h2>Next test</h2>\n<p>";
+  if (e.suggested_test && e.suggested_cut) {
+    out << "Make this test: <b>" << cutText(*e.suggested_cut) << "</b>";
+    if (e.outcome) out << formatted("; %.2g s in the cut are enough", e.outcome->duration);
+    out << ". ";
+    if (e.outcome) out << outcomeText(*e.outcome);
+    out << "Add the record to campaign.yaml and search again:</p>" << searchCommand(campaign, folder, false);
+  } else if (e.suggested_test) {
+    out << "Make " << escapedHtml(*e.suggested_test) << ".</p>";
+  } else if (!e.not_tried.empty()) {
+    out << "First complete the search (see What to do now); then the report states whether a test is "
+           "needed.</p>";
+  } else if (e.unexplained.empty() || e.named_only) {
+    out << (e.named_only ? "No cut is known that shows the source of what has no name.</p>"
+            : e.effects.empty()
+                ? "No further test is needed: no difference beyond the noise remains.</p>"
+                : "No further test is needed: no difference beyond the noise remains, and no other "
+                  "cause that was checked does the same.</p>");
+  } else {
+    out << "No single cut decides what the remainder is. Its signal, place and dependence are listed "
+           "below.</p>";
+  }
+  out << "\n" << measuredInstead(e);
+}
+
+void actions(std::ostream& out, const Explanation& e, const std::string& campaign,
+             const std::string& folder) {
   std::vector<std::string> steps;
-  const auto add = [&steps](const std::string& step) {
-    if (std::find(steps.begin(), steps.end(), step) == steps.end()) steps.push_back(step);
-  };
   for (const FoundEffect& f : e.effects) {
     const std::string& advice = findEffect(f.name)->advice;
-    if (!advice.empty()) add("<b>" + titleOf(f.name) + "</b>: " + escapedHtml(advice) + ".");
+    if (!advice.empty()) steps.push_back("<b>" + causeTitle(f.name) + "</b>: " + escapedHtml(advice) + ".");
+    for (const Rival& r : f.alternatives) {
+      if (isRival(e, f.name, r.name))
+        steps.push_back("or <b>" + causeTitle(r.name) + "</b>: " + escapedHtml(findEffect(r.name)->advice) +
+                        ".");
+    }
   }
   if (e.verdict == Verdict::recalibrated) {
     for (const auto& group : e.not_separable) {
       for (const std::string& name : group)
-        add("Exclude <b>" + titleOf(name) +
-            "</b>, which would do the same: " + escapedHtml(findEffect(name)->advice) + ".");
+        steps.push_back("Exclude <b>" + causeTitle(name) +
+                        "</b>, which would do the same: " + escapedHtml(findEffect(name)->advice) + ".");
     }
-    add("Check whether tool and material are those of the model. If they are, its values were off.");
+    steps.push_back(
+        "Check whether tool and material are those of the model. If they are, its values were wrong.");
   }
-  if (e.suggested_test)
-    add("Make this test, which decides what these records leave open: " + escapedHtml(*e.suggested_test) +
-        ".");
-  if (e.verdict != Verdict::no_disagreement)
-    add("Use the improved model: <code>pipeline.launch model:=</code> or <code>machine.launch model:=</code> "
-        "with "
-        "<code>model.yaml</code> of this folder.");
-  if (!e.unexplained.empty())
-    add("The rest has no name. Where it is and what it depends on is listed under <i>Unexplained "
-        "residual</i>.");
-  if (steps.empty()) return;
-  out << "<h2>What to do</h2>\n<ol>";
+  if (!e.not_tried.empty()) {
+    const std::string whole = searchCommand(campaign, folder, true);
+    steps.push_back("Complete the search, without a limit of its time:" + whole);
+  }
+  if (!e.sentence.empty() && e.verdict != Verdict::recalibrated)
+    steps.push_back("Look at the machine for the source of what has no name: " + escapedHtml(e.sentence));
+  if (e.verdict == Verdict::no_disagreement)
+    steps.push_back("Nothing: use the supplied model.");
+  else
+    steps.push_back((e.verdict == Verdict::recalibrated ? "Use the corrected model:"
+                     : e.effects.empty()
+                         ? "The cause is not known. Until it is, the corrected model predicts better than "
+                           "the supplied one:"
+                         : "Until the cause is removed, use the corrected model:") +
+                    command("roslaunch smartmill_launch pipeline.launch model:=" + folder + "/model.yaml"));
+  out << "<h2>What to do now</h2>\n<ol>";
   for (const std::string& step : steps) out << "<li>" << step << "</li>";
   out << "</ol>\n";
 }
 
-void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
-  if (channels.empty()) return;
-  out << "<h2>Shares of the variance in all cuts</h2>\n<table><tr><th>channel<th>explained "
-         "before<th>explained "
-         "after<th>synchronous with the spindle<th>RMS of the asynchronous part<th>the same over the "
-         "noise</tr>\n";
-  const auto percent = [](double share) { return number(100.0 * share, "%.2f %%"); };
-  for (const ChannelShare& c : channels) {
-    out << "<tr><td>" << c.channel << "<td>" << percent(c.explained_before) << "<td>"
-        << percent(c.explained_after);
+// ---- difference
+
+// Of what a corrected model does not predict over what the channel does in the cuts.
+std::string unpredictedText(const Explanation& e, const std::string& channel) {
+  for (const ChannelShare& c : e.channels) {
+    if (c.channel != channel) continue;
+    if (c.explained_after < 0.0) return "worse than a constant";
+    return formatted("%.2g %%", 100.0 * std::sqrt(1.0 - c.explained_after));
+  }
+  return "";
+}
+
+void difference(std::ostream& out, const Explanation& e) {
+  out << "<h2>How well the models predict the measurement</h2>\n<table><tr><th>difference "
+         "(RMS)<th>noise<th>fitted "
+         "tests, supplied model<th>corrected model<th>held-out tests, supplied model<th>corrected "
+         "model<th>corrected "
+         "model, noise included, of the variation in the cuts</tr>\n<tr><td><b>all signals, times the "
+         "noise</b><td>1<td><b>"
+      << times(e.before.fit) << "</b><td><b>" << times(e.after.fit) << "</b><td><b>"
+      << times(e.before.heldout) << "</b><td><b>" << times(e.after.heldout) << "</b><td></tr>\n";
+  for (const auto& [channel, noise] : e.noise) {
+    const ChannelWords words = channelWords(channel);
+    const auto cell = [&, &name = channel, &rms = noise](bool heldout, bool corrected) {
+      const double value = differenceOf(
+          e.gaps, corrected, [&](const TestGap& g) { return g.channel == name && g.heldout == heldout; });
+      return "<td>" + (value > 0.0 ? words.text(value * rms) : "");
+    };
+    out << "<tr><td>" << words.title << " <span class=\"dim\">(" << channel << ")</span><td>"
+        << words.text(noise) << cell(false, false) << cell(false, true) << cell(true, false)
+        << cell(true, true) << "<td>" << unpredictedText(e, channel) << "</tr>\n";
+  }
+  out << "</table>\n";
+  std::vector<std::string> names;
+  for (const ReportedTest& t : e.tests) {
+    if (t.heldout) names.push_back(t.test.name);
+  }
+  out << "<p class=\"dim\">At 1 times the noise only noise remains. "
+      << (names.empty() ? "No test was held out."
+                        : "Held-out tests took no part in the search: " + escapedHtml(joined(names)) + ".")
+      << "</p>\n";
+}
+
+// ---- remainder
+
+// Squares above the noise of the fitted tests, of the model to whose residual the findings belong.
+double remainingSquares(const Explanation& e) {
+  double samples = 0.0;
+  for (const TestGap& g : e.gaps) {
+    if (!g.heldout && g.std_dev > 0.0) samples += 0.5 / (g.std_dev * g.std_dev);
+  }
+  const double gap = e.named_only ? e.named_only->fit : e.after.fit;
+  return samples * std::max(gap * gap - 1.0, 0.0);
+}
+
+// Those with a share worth listing, the largest first.
+std::vector<std::pair<double, const Finding*>> largestOf(const std::vector<Finding>& list, double squares) {
+  std::vector<std::pair<double, const Finding*>> largest;
+  for (const Finding& f : list) {
+    const double share = squares > 0.0 ? std::min(f.squares / squares, 1.0) : 0.0;
+    if (share >= LEAST_SHARE) largest.emplace_back(share, &f);
+  }
+  std::stable_sort(largest.begin(), largest.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  return largest;
+}
+
+std::string placeText(const Finding& f, int teeth) {
+  if (f.domain == "order") {
+    const double order = f.location.at("order");
+    const bool at_teeth = teeth > 1 && std::abs(std::remainder(order, teeth)) < 1e-6;
+    return (order == 1.0 ? std::string("once per revolution")
+                         : formatted("%.4g times per revolution", order)) +
+           (!at_teeth        ? ""
+            : order == teeth ? " (the tooth passing)"
+                             : formatted(" (%.0f times the tooth passing)", order / teeth));
+  }
+  if (f.domain == "frequency")
+    return formatted("at %.4g Hz, not locked to the spindle", f.location.at("frequency_hz"));
+  if (f.domain == "time")
+    return formatted("changes %.3g s after the start of the record", f.location.at("time_s"));
+  return f.domain == "level" ? "constant during a record" : f.domain;
+}
+
+std::string findingText(const Finding& f, int teeth) {
+  const ChannelWords words = channelWords(f.channel);
+  return words.title + ", " + words.text(f.amplitude) + ", " + placeText(f, teeth);
+}
+
+void findings(std::ostream& out, const std::vector<std::pair<double, const Finding*>>& list,
+              const Explanation& e) {
+  if (list.empty()) return;
+  out << "<table><tr><th>signal<th>largest amplitude<th>where<th>share<th>changes with<th>tests</tr>\n";
+  const int teeth = e.nominal.tool ? e.nominal.tool->teeth : 0;
+  for (const auto& [share, f] : list) {
+    const ChannelWords words = channelWords(f->channel);
+    out << "<tr><td>" << words.title << "<td>" << words.text(f->amplitude) << "<td>" << placeText(*f, teeth)
+        << "<td>" << percentText(share) << "<td>" << joined(f->depends_on) << "<td>" << f->tests.size()
+        << " of " << e.tests.size() << "</tr>\n";
+  }
+  out << "</table>\n";
+}
+
+void remainder(std::ostream& out, const Explanation& e) {
+  if (e.verdict == Verdict::no_disagreement) return;
+  out << "<h2>What is not explained</h2>\n<p>";
+  const bool only_noise = e.after.fit < ONLY_NOISE;
+  const auto largest = largestOf(e.unexplained, remainingSquares(e));
+  const Finding* const first = !largest.empty()         ? largest.front().second
+                               : !e.unexplained.empty() ? &e.unexplained.front()
+                                                        : nullptr;
+  if (only_noise)
+    out << "With the corrected model only noise remains (difference " << times(e.after.fit)
+        << " times the noise): nothing that matters. ";
+  else
+    out << "With the corrected model a difference of " << times(e.after.fit) << " times the noise remains. ";
+  if (first)
+    out << (e.named_only ? "It contains the effect without a name, which was: " : "Its largest part: ")
+        << findingText(*first, e.nominal.tool ? e.nominal.tool->teeth : 0) << ". ";
+  if (!only_noise) {
+    std::vector<std::string> shares;
+    for (const ChannelShare& c : e.channels) {
+      if (c.explained_after >= 0.0)
+        shares.push_back(channelWords(c.channel).title + " " + unpredictedText(e, c.channel));
+    }
+    if (!shares.empty())
+      out << "It limits the predictions of the corrected model; the difference is, of the variation in the "
+             "cuts: "
+          << joined(shares) << ".";
+  }
+  out << "</p>\n";
+  findings(out, largest, e);
+}
+
+void inspection(std::ostream& out, const InspectionCheck& check) {
+  if (check.dimensions.empty()) return;
+  out << "<h2>Measured dimensions of the parts</h2>\n<p>" << check.text()
+      << ". The search did not use them.</p>\n<table><tr><th>cut<th>dimension<th>measured minus "
+         "nominal<th>supplied "
+         "model<th>corrected model</tr>\n";
+  const auto microns = [](double value) { return formatted("%.1f &micro;m", value / units::UM); };
+  for (const InspectedDimension& d : check.dimensions)
+    out << "<tr><td>" << escapedHtml(d.test) << "<td>"
+        << (d.kind == SLOT_WIDTH ? "width of the slot along " : "position of the face along ") << d.direction
+        << "<td>" << microns(d.measured) << " &plusmn; " << microns(1.96 * d.std_dev) << "<td>"
+        << microns(d.before) << (d.agreesBefore() ? "" : ", differs") << "<td>" << microns(d.after)
+        << (d.agreesAfter() ? "" : ", differs") << "</tr>\n";
+  out << "</table>\n";
+}
+
+// ---- tests
+
+std::string worseText(const Explanation& e, const std::string& test) {
+  std::string text;
+  for (const TestGap& g : e.gaps) {
+    if (g.test == test && gotWorse(g))
+      text += "<span class=\"bad\">worse</span> " + channelWords(g.channel).title + " " + times(g.before) +
+              " &rarr; " + times(g.after) + "<br>";
+  }
+  return text;
+}
+
+void tests(std::ostream& out, const Explanation& e) {
+  out << "<h2>Tests</h2>\n<table><tr><th>test<th>kind<th>speed [rpm]<th>feed per tooth [mm]<th>depth "
+         "[mm]<th>immersion [&deg;]<th>held out<th>supplied model<th>corrected model<th>worse signals</tr>\n";
+  for (const ReportedTest& t : e.tests) {
+    const auto of_test = [&](const TestGap& g) { return g.test == t.test.name; };
+    out << "<tr><td>" << escapedHtml(t.test.name) << "<td>" << kindText(t.test) << "<td>"
+        << formatted("%.0f", units::rpmFromRadPerSec(t.test.spindle_speed));
+    if (const std::optional<Engagement>& c = t.test.engagement)
+      out << "<td>" << formatted("%.3g", c->feed_per_tooth / units::MM) << "<td>"
+          << formatted("%.3g", c->axial_depth / units::MM) << "<td>"
+          << formatted("%.0f to %.0f", units::degFromRad(c->entry), units::degFromRad(c->exit));
+    else
+      out << "<td><td><td>";
+    const double before = differenceOf(e.gaps, false, of_test), after = differenceOf(e.gaps, true, of_test);
+    out << "<td>" << (t.heldout ? "yes" : "");
+    if (before > 0.0)
+      out << "<td>" << times(before) << "<td>" << times(after) << "<td>" << worseText(e, t.test.name)
+          << "</tr>\n";
+    else
+      out << "<td><td><td>" << (t.left_out ? "left out: it chatters" : "chatters, compared step by step")
+          << "</tr>\n";
+  }
+  out << "</table>\n<p class=\"dim\">Difference of all signals of a test, times the noise.</p>\n";
+}
+
+// ---- quality of data and search
+
+std::string vibrationText(const Explanation& e) {
+  std::vector<std::string> parts;
+  for (const ChannelShare& c : e.channels) {
     if (c.synchronous_share)
-      out << "<td>" << percent(*c.synchronous_share) << "<td>" << number(c.floor) << "<td>"
-          << number(c.floor_gap);
-    out << "</tr>\n";
+      parts.push_back(channelWords(c.channel).title + " " + channelWords(c.channel).text(c.floor));
   }
-  out << "</table>\n";
+  return parts.empty() ? ""
+                       : " Part of the signals that is not locked to the spindle, noise included (RMS): " +
+                             joined(parts) + ".";
 }
 
-void chattering(std::ostream& out, const std::vector<ChatteringCut>& cuts) {
-  if (cuts.empty()) return;
-  out << "<h2>Cuts that chatter</h2>\n<p>Compared by one-step prediction, not by free simulation; "
-         "not part of the gaps.</p>\n<table><tr><th>test<th>frequency [Hz]<th>amplitude [N]<th>prediction "
-         "error before<th>after</tr>\n";
-  for (const ChatteringCut& c : cuts) {
-    out << "<tr><td>" << escapedHtml(c.test) << "<td>" << number(c.frequency) << "<td>" << number(c.amplitude)
-        << "<td>" << number(100.0 * c.before, "%.1f %%") << "<td>" << number(100.0 * c.after, "%.1f %%")
-        << "</tr>\n";
+void quality(std::ostream& out, const Explanation& e) {
+  std::vector<std::string> lines;
+  lines.push_back(searchText(e) + formatted(" It took %.0f s", e.seconds) +
+                  (e.spent_budget
+                       ? formatted("; its stages were ended by the budget of %.0f s.", *e.spent_budget)
+                       : std::string(".")) +
+                  (e.interrupted ? " It was interrupted by the user." : ""));
+  std::vector<std::string> left_out;
+  for (const ReportedTest& t : e.tests) {
+    if (t.left_out) left_out.push_back(t.test.name);
   }
-  out << "</table>\n";
-}
-
-void images(ReportPage& page, const std::vector<std::string>& pictures, const std::string& folder) {
-  for (const std::string& name : pictures) {
-    // Revolutions and spectra are drawn from their data.
-    if (const auto caption = CAPTIONS.find(name); caption != CAPTIONS.end())
-      page.picture(folder + "/" + name, caption->second);
+  const bool chatter = !left_out.empty() || !e.chattering.empty();
+  lines.push_back("Tests: " +
+                  (left_out.empty()
+                       ? "none was left out. "
+                       : "left out, since they chatter: " + escapedHtml(joined(left_out)) + ". ") +
+                  (chatter ? "" : "No test chatters.") + vibrationText(e));
+  std::string shifts;
+  for (const std::string& note : e.notes) {
+    if (note.find("are recorded") != std::string::npos) shifts += " " + escapedHtml(note) + ".";
   }
+  lines.push_back(
+      "Signals: no force and no displacement is clipped by the recorder (such records are refused)." +
+      (shifts.empty() ? std::string(" No shift in time between force sensor and controller was corrected.")
+                      : shifts));
+  std::size_t beyond = 0;
+  for (const RecalibratedValue& v : e.calibrated) beyond += std::abs(v.deviations) > 2.0;
+  if (!e.calibrated.empty()) {
+    const RecalibratedValue& most = e.calibrated.front();
+    lines.push_back(
+        formatted("Values of the supplied model: %zu were refined, %zu of them beyond twice their stated "
+                  "uncertainty. Most: %s %.4g &rarr; %.4g (%+.2f %%). All are in the appendix.",
+                  e.calibrated.size(), beyond, most.name.c_str(), most.before, most.after,
+                  100.0 * (most.after / most.before - 1.0)));
+  }
+  const auto worse = static_cast<std::size_t>(std::count_if(e.gaps.begin(), e.gaps.end(), gotWorse));
+  lines.push_back(worse == 0
+                      ? "No signal of any test is predicted worse by the corrected model."
+                      : formatted("%zu of %zu signals (tests times channels) are predicted worse by the "
+                                  "corrected model; they are marked in the table of the tests.",
+                                  worse, e.gaps.size()));
+  list(out, "Data and search", lines);
 }
 
-std::string unitOf(const std::string& channel) {
-  return channel == "load_meter"         ? "load meter [V]"
-         : channel.rfind("tool", 0) == 0 ? "displacement [m]"
-                                         : "force [N]";
+// ---- plots
+
+std::string axisText(const std::string& channel) {
+  const ChannelWords words = channelWords(channel);
+  std::string unit = words.unit;
+  if (unit == "&micro;m") unit = "\u00b5m";
+  if (unit == "m/s&sup2;") unit = "m/s\u00b2";
+  return words.title + " [" + unit + "]";
 }
 
-void curves(ReportPage& page, const Explanation& e) {
-  if (!e.revolutions.empty())
-    page.html()
-        << "<h2>Force over one revolution</h2>\n<p>The wheel zooms, dragging moves, a double click shows "
-           "everything.</p>\n";
+std::vector<double> scaled(std::vector<double> values, const std::string& channel) {
+  for (double& v : values) v *= channelWords(channel).scale;
+  return values;
+}
+
+constexpr const char* SUPPLIED_COLOUR = "#d95f02";
+constexpr const char* CORRECTED_COLOUR = "#1b9e77";
+
+void revolutions(ReportPage& page, const Explanation& e) {
+  if (e.revolutions.empty()) return;
+  page.html()
+      << "<h2 class=\"page\">Signal over one revolution</h2>\n<p class=\"dim\">The wheel zooms, dragging "
+         "moves, a "
+         "double click shows everything. Mean of all revolutions; the test with the largest difference is "
+         "first.</p>\n";
   std::string test;
   for (const RevolutionCurve& c : e.revolutions) {
     if (c.test != test) {
@@ -225,84 +611,218 @@ void curves(ReportPage& page, const Explanation& e) {
       page.html() << "<div class=\"plots\">\n";
       test = c.test;
     }
-    page.plot({c.channel + ", " + c.test,
+    page.plot({channelWords(c.channel).title + ", " + c.test,
                "spindle angle [deg]",
-               unitOf(c.channel),
+               axisText(c.channel),
                false,
-               {{"measured", "#8d99a6", true, c.angle_deg, c.measured},
-                {"model as stated", "#d95f02", false, c.angle_deg, c.nominal},
-                {"improved model", "#1b9e77", false, c.angle_deg, c.improved}}});
+               {{"supplied model", SUPPLIED_COLOUR, false, c.angle_deg, scaled(c.nominal, c.channel)},
+                {"corrected model", CORRECTED_COLOUR, false, c.angle_deg, scaled(c.improved, c.channel)},
+                {"measured", "var(--text)", true, c.angle_deg, scaled(c.measured, c.channel)}}});
   }
-  if (!test.empty()) page.html() << "</div>\n", page.endChoice();
-  if (e.spectra.empty()) return;
-  page.html() << "<h2>Spectra of measured minus simulated</h2>\n<div class=\"plots\">\n";
-  for (const SpectrumCurve& s : e.spectra) {
-    const std::string order = s.order_hz > 0.0 ? formatted(", one order is %.4g Hz", s.order_hz) : "";
-    page.plot({s.channel + ", " + s.test + order,
-               "frequency [Hz]",
-               unitOf(s.channel),
-               true,
-               {{"before", "#d95f02", false, s.frequency_hz, s.before},
-                {"after", "#1b9e77", false, s.frequency_hz, s.after}}});
+  page.html() << "</div>\n";
+  page.endChoice();
+}
+
+std::vector<PagePlot::Mark> orderMarks(const SpectrumCurve& s, int teeth) {
+  std::vector<PagePlot::Mark> marks;
+  if (s.order_hz <= 0.0) return marks;
+  std::set<int> orders{1};
+  for (int k = 1; k <= 3 && teeth > 0; ++k) orders.insert(k * teeth);
+  for (const int order : orders) marks.push_back({order * s.order_hz, formatted("%dx", order)});
+  return marks;
+}
+
+// The largest line before, and the same after.
+std::string largestLine(const SpectrumCurve& s) {
+  const auto largest = std::max_element(s.before.begin(), s.before.end());
+  if (largest == s.before.end()) return "";
+  const auto k = static_cast<std::size_t>(largest - s.before.begin());
+  const ChannelWords words = channelWords(s.channel);
+  const double order = s.order_hz > 0.0 ? s.frequency_hz[k] / s.order_hz : 0.0;
+  return words.title + " in " + escapedHtml(s.test) + ": " + words.text(s.before[k]) + " at " +
+         formatted("%.4g Hz", s.frequency_hz[k]) +
+         (order == 0.0  ? ""
+          : order < 0.5 ? ", slower than the spindle"
+                        : formatted(", %.3g times per revolution", order)) +
+         "; with the corrected model " + words.text(s.after[k]);
+}
+
+// What the models lack in the forces of each cut, over the cutting time of the edge.
+void wear(ReportPage& page, const Explanation& e) {
+  if (std::none_of(e.effects.begin(), e.effects.end(),
+                   [](const FoundEffect& f) { return f.name == "tool_wear"; }))
+    return;
+  PagePlot::Curve before{"supplied model", SUPPLIED_COLOUR, true, {}, {}},
+      after{"corrected model", CORRECTED_COLOUR, true, {}, {}};
+  for (const ReportedTest& t : e.tests) {
+    if (t.test.kind != TestKind::cut || !t.test.cut_time_before) continue;
+    double supplied = 0.0, corrected = 0.0;  // [N2]
+    for (const TestGap& g : e.gaps) {
+      const auto& forces = FORCE_CHANNELS;
+      if (g.test != t.test.name || std::find(forces.begin(), forces.end(), g.channel) == forces.end())
+        continue;
+      supplied += std::pow(g.before * e.noise.at(g.channel), 2);
+      corrected += std::pow(g.after * e.noise.at(g.channel), 2);
+    }
+    for (PagePlot::Curve* curve : {&before, &after}) curve->x.push_back(*t.test.cut_time_before / 60.0);
+    before.y.push_back(std::sqrt(supplied));
+    after.y.push_back(std::sqrt(corrected));
   }
+  page.html()
+      << "<h2>Wear over the cutting time</h2>\n<p>Force that a model lacks in each cut, RMS of fx, fy and fz "
+         "together. With wear it grows with the cutting time of the edge and with the depth of the "
+         "cut.</p>\n<div class=\"plots\">\n";
+  page.plot({"difference of the forces",
+             "cutting time of the edge before the cut [min]",
+             "difference [N]",
+             false,
+             {before, after}});
   page.html() << "</div>\n";
 }
 
-void candidates(std::ostream& out, const std::vector<CandidateResult>& tried) {
-  if (tried.empty()) return;
-  out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>predicted "
-         "gain<th>BIC gain<th>tests simulated<th>seconds</tr>\n";
-  for (const CandidateResult& t : tried) {
-    out << "<tr><td>" << t.round + 1 << "<td>" << (t.accepted ? "<b>" : "") << t.effect
-        << (t.variant.empty() ? "" : " (" + t.variant + ")") << (t.accepted ? "</b>" : "") << "<td>"
-        << number(t.predicted_gain) << "<td>" << number(t.delta_bic) << "<td>" << t.simulations << "<td>"
-        << number(t.seconds, "%.1f") << "</tr>\n";
+void spectra(ReportPage& page, const Explanation& e) {
+  if (e.spectra.empty()) return;
+  std::vector<std::string> lines;
+  for (const SpectrumCurve& s : e.spectra) lines.push_back(largestLine(s));
+  page.html()
+      << "<h2>Spectra of the difference</h2>\n<p>Largest lines:</p>\n<ul><li>" << joined(lines, "</li><li>")
+      << "</li></ul>\n<p class=\"dim\">Dashed: once per revolution (1x) and the tooth passing with its "
+         "multiples.</p>\n"
+         "<div class=\"plots\">\n";
+  for (const SpectrumCurve& s : e.spectra)
+    page.plot({channelWords(s.channel).title + ", " + s.test,
+               "frequency [Hz]",
+               axisText(s.channel),
+               true,
+               {{"supplied model", SUPPLIED_COLOUR, false, s.frequency_hz, scaled(s.before, s.channel)},
+                {"corrected model", CORRECTED_COLOUR, false, s.frequency_hz, scaled(s.after, s.channel)}},
+               orderMarks(s, e.nominal.tool ? e.nominal.tool->teeth : 0)});
+  page.html() << "</div>\n";
+}
+
+// ---- appendix
+
+// Levels of colour of a difference, times the noise.
+std::string cellText(const TestGap& g) {
+  int level = 0;
+  for (const double limit : {1.2, 2.0, 5.0, 20.0}) level += g.after > limit;
+  return "<td" + (level ? formatted(" class=\"level%d\"", level) : "") + ">" + times(g.before) + " &rarr; " +
+         times(g.after) + (gotWorse(g) ? " (worse)" : "");
+}
+
+void cells(std::ostream& out, const Explanation& e) {
+  out << "<h2>Difference of every signal of every test</h2>\n<p class=\"dim\">Times the noise, supplied "
+         "&rarr; corrected "
+         "model; coloured by the corrected one above 1.2, 2, 5 and 20. Empty: the signal is not recorded or "
+         "not "
+         "compared in this test.</p>\n<table><tr><th>test";
+  for (const auto& [channel, noise] : e.noise) out << "<th>" << channel;
+  out << "</tr>\n";
+  for (const ReportedTest& t : e.tests) {
+    out << "<tr><td>" << escapedHtml(t.test.name) << (t.heldout ? " (held out)" : "");
+    for (const auto& [channel, noise] : e.noise) {
+      const auto cell = std::find_if(e.gaps.begin(), e.gaps.end(), [&, &c = channel](const TestGap& g) {
+        return g.test == t.test.name && g.channel == c;
+      });
+      out << (cell == e.gaps.end() ? "<td>" : cellText(*cell));
+    }
+    out << "</tr>\n";
   }
   out << "</table>\n";
 }
 
-void inspection(std::ostream& out, const InspectionCheck& check) {
-  if (check.dimensions.empty()) return;
-  out << "<h2>Measured dimensions of the parts</h2>\n<p>" << check.text()
-      << ". The search did not use them.</p>\n<table><tr><th>cut<th>dimension<th>measured minus nominal<th>"
-         "stated model<th>improved model</tr>\n";
-  const auto microns = [](double value) { return number(value / units::UM, "%.1f") + " &micro;m"; };
-  for (const InspectedDimension& d : check.dimensions)
-    out << "<tr><td>" << escapedHtml(d.test) << "<td>"
-        << (d.kind == SLOT_WIDTH ? "width of the slot along " : "position of the face along ") << d.direction
-        << "<td>" << microns(d.measured) << " &plusmn; " << microns(d.std_dev) << "<td>" << microns(d.before)
-        << (d.agreesBefore() ? "" : ", differs") << "<td>" << microns(d.after)
-        << (d.agreesAfter() ? "" : ", differs") << "</tr>\n";
+void candidates(std::ostream& out, const Explanation& e) {
+  if (!e.candidates.empty()) {
+    out << "<h2>Causes that were compared by a fit</h2>\n<table><tr><th>round<th>cause<th>explains, of the "
+           "best "
+           "of its round<th>accepted</tr>\n";
+    for (const CandidateResult& t : e.candidates) {
+      double best = 0.0;
+      for (const CandidateResult& other : e.candidates) {
+        if (other.round == t.round) best = std::max(best, other.delta_bic);
+      }
+      out << "<tr><td>" << t.round + 1 << "<td>" << namedCause(t.effect)
+          << (t.variant.empty() ? "" : ", " + escapedHtml(t.variant)) << "<td>"
+          << (best > 0.0 && t.delta_bic > 0.0 ? formatted("%.3g %%", 100.0 * t.delta_bic / best) : "none")
+          << "<td>" << (t.accepted ? "accepted" : "") << "</tr>\n";
+    }
+    out << "</table>\n";
+  }
+  std::vector<std::string> unchecked;
+  for (const std::string& name : e.not_tried) unchecked.push_back(namedCause(name));
+  for (const std::string& note : e.notes) {
+    if (const std::size_t end = note.find(NOT_TESTED); end != std::string::npos)
+      unchecked.push_back(namedCause(note.substr(0, end)) + ": these tests cannot show it, " +
+                          escapedHtml(note.substr(end + NOT_TESTED.size())));
+  }
+  list(out, "Causes that were not checked", unchecked);
+}
+
+void chattering(std::ostream& out, const std::vector<ChatteringCut>& cuts) {
+  if (cuts.empty()) return;
+  out << "<h2>Cuts that chatter</h2>\n<p>Compared by one-step prediction, not by free simulation; not part "
+         "of the "
+         "difference above.</p>\n<table><tr><th>test<th>frequency [Hz]<th>amplitude [N]<th>error of the "
+         "prediction, "
+         "supplied model<th>corrected model</tr>\n";
+  for (const ChatteringCut& c : cuts)
+    out << "<tr><td>" << escapedHtml(c.test) << formatted("<td>%.4g<td>%.3g", c.frequency, c.amplitude)
+        << formatted("<td>%.1f %%<td>%.1f %%", 100.0 * c.before, 100.0 * c.after) << "</tr>\n";
   out << "</table>\n";
 }
 
-void notes(std::ostream& out, const std::vector<std::string>& lines) {
-  if (lines.empty()) return;
-  out << "<h2>Notes</h2>\n<ul>";
-  for (const std::string& note : lines) out << "<li>" << escapedHtml(note) << "</li>";
-  out << "</ul>\n";
+void appendix(std::ostream& out, const Explanation& e) {
+  out << "<details class=\"page\"><summary>Appendix: every signal, causes compared and not checked, values, "
+         "notes</summary>\n";
+  cells(out, e);
+  candidates(out, e);
+  if (const auto largest = largestOf(e.where,
+                                     [&] {
+                                       double squares = 0.0;
+                                       for (const Finding& f : e.where) squares += f.squares;
+                                       return squares;
+                                     }());
+      !largest.empty()) {
+    out << "<h2>Where the supplied model differs</h2>\n";
+    findings(out, largest, e);
+  }
+  values(out, "Values of the model", e.calibrated);
+  chattering(out, e.chattering);
+  std::vector<std::string> notes;
+  for (const std::string& note : e.notes) {
+    if (note.find(NOT_TESTED) == std::string::npos) notes.push_back(escapedHtml(note));
+  }
+  list(out, "Notes", notes);
+  out << "<p class=\"dim\">Verdict in report.json: " << nameOf(e.verdict) << ".</p>\n</details>\n";
 }
 
 }  // namespace
 
-void writeHtml(const Explanation& e, const std::string& campaign, const std::vector<std::string>& pictures,
-               const std::string& folder) {
-  ReportPage page("Where simulation and measurement disagree: " + campaign);
+void writeHtml(const Explanation& e, const std::string& campaign, const std::string& folder) {
+  namespace fs = std::filesystem;
+  const auto whole = [](const std::string& path) {
+    std::string text = fs::absolute(path).lexically_normal().string();
+    while (text.size() > 1 && text.back() == '/') text.pop_back();
+    return text;
+  };
+  const std::string from = whole(campaign), to = whole(folder);
+  ReportPage page("Measurement and simulation: " + fs::path(from).filename().string());
   std::ostream& out = page.html();
-  verdict(out, e);
-  recalibrated(out, e.recalibrated);
-  effects(out, e);
+  head(out, e);
+  causes(out, e);
+  notNamed(out, e);
+  values(out, "Values of the supplied model that are wrong", e.recalibrated);
+  actions(out, e, from, to);
+  nextTest(out, e, from, to);
+  difference(out, e);
+  remainder(out, e);
   inspection(out, e.inspection);
-  nextSteps(out, e);
-  shares(out, e.channels);
-  chattering(out, e.chattering);
-  curves(page, e);
-  images(page, pictures, folder);
-  findings(out, "Unexplained residual", e.unexplained);
-  findings(out, "Disagreement of the nominal model", e.where);
-  candidates(out, e.candidates);
-  notes(out, e.notes);
-  out << "<p>" << number(e.seconds, "%.0f") << " s.</p>\n";
+  tests(out, e);
+  quality(out, e);
+  revolutions(page, e);
+  wear(page, e);
+  spectra(page, e);
+  appendix(out, e);
   page.write(folder + "/report.html");
 }
 

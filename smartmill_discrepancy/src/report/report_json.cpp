@@ -77,8 +77,8 @@ Json effectsOf(const std::vector<FoundEffect>& effects) {
     }
     for (const auto& [key, word] : effect.words) parameters[key] = {{"value", word}};
     Json alternatives = Json::array();
-    for (const auto& [name, delta] : effect.alternatives)
-      alternatives.push_back({{"name", name}, {"delta_bic", rounded(delta)}});
+    for (const Rival& rival : effect.alternatives)
+      alternatives.push_back({{"name", rival.name}, {"delta_bic", rounded(rival.delta_bic)}});
     Json entry = {{"name", effect.name}};
     if (const EffectKind* kind = findEffect(effect.name); kind && kind->empirical())
       entry = {{"name", EMPIRICAL}, {"stage", kind->form_stage}, {"form", kind->form}};

@@ -1,5 +1,6 @@
 #include "smartmill_discrepancy/search/separating_test.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "smartmill_core/error.h"
@@ -18,14 +19,17 @@ struct SeparatingTestOptions {
 
 const SeparatingTestOptions LIMITS;
 
-// RMS difference of two models over the noise in one test.
-double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a, const MachineModel& b,
-                  double duration) {
+Record predicted(const MachineModel& model, const CampaignTest& test) {
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = COARSE_SUBSTEPS;
-  const Record first = sim::simulateTest(a, test, duration, options);
-  const Record second = sim::simulateTest(b, test, duration, options);
+  return sim::simulateTest(model, test, LIMITS.duration, options);
+}
+
+// RMS difference of two models over the noise in one test.
+double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a,
+                  const MachineModel& b) {
+  const Record first = predicted(a, test), second = predicted(b, test);
   double squares = 0.0;
   std::size_t count = 0;
   for (const auto& [channel, noise] : data.noise) {
@@ -35,6 +39,34 @@ double separation(const Dataset& data, const CampaignTest& test, const MachineMo
     count += x.size();
   }
   return count ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+}
+
+TestOutcome outcomeOf(const Dataset& data, const CampaignTest& test, const MachineModel& a,
+                      const MachineModel& b) {
+  const Record first = predicted(a, test), second = predicted(b, test);
+  const auto peakOf = [](const std::vector<double>& values) {
+    double peak = 0.0;
+    for (const double v : values) peak = std::max(peak, std::abs(v));
+    return peak;
+  };
+  TestOutcome outcome;
+  outcome.duration = LIMITS.duration;
+  double largest = -1.0;
+  for (const auto& [channel, noise] : data.noise) {
+    if (!first.has(channel) || !second.has(channel)) continue;
+    const double one = peakOf(first.column(channel)), other = peakOf(second.column(channel));
+    if (std::abs(one - other) / noise <= largest) continue;
+    largest = std::abs(one - other) / noise;
+    outcome.channel = channel;
+    outcome.peak = one;
+    outcome.other_peak = other;
+  }
+  const auto first_cut = static_cast<std::size_t>(test.engage_time.value_or(0.0) * test.sample_rate);
+  const auto chatters = [&](const Record& record) {
+    return findChatter(record, test, first_cut).has_value();
+  };
+  outcome.chatters = test.engagement && (chatters(first) || chatters(second));
+  return outcome;
 }
 
 /// ", feed at 90 deg from +x"; empty: along +x.
@@ -64,12 +96,12 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
           }
           double value = 0.0;
           try {
-            value = separation(data, test, a, b, LIMITS.duration);
+            value = separation(data, test, a, b);
           } catch (const Error&) {
             continue;  // the twin cannot simulate this test
           }
           if (value <= (best ? best->difference : 0.0)) continue;
-          best = SeparatingTest{"", test, value};
+          best = SeparatingTest{"", test, value, {}};
           if (test.engagement) {
             best->text = formatted(
                 "a cut at %.0f rpm, %.3g mm per tooth, %.3g mm deep, from %.0f to %.0f deg%s: the "
@@ -85,6 +117,7 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
       }
     }
   }
+  if (best) best->outcome = outcomeOf(data, best->test, a, b);
   return best;
 }
 

@@ -17,6 +17,9 @@ struct ModelResidual {
 };
 ModelResidual residualOf(const Workbench& bench, const MachineModel& model);
 
+/// Gap of the held-out tests; 0: there are none.
+double heldoutGap(const Workbench& bench, const MachineModel& model);
+
 /// Writes the improved model to FOLDER/model.yaml, reads it back and measures its residual.
 /// @param result receives model, after, gaps and curves
 void writeOutcome(const Workbench& bench, const ModelResidual& before, const MachineModel& improved,

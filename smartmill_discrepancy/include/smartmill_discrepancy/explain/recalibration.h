@@ -11,6 +11,10 @@
 
 namespace smartmill::discrepancy {
 
+/// All nominal values that are free within their stated uncertainty, most deviations first.
+/// @param fit with covariance
+std::vector<RecalibratedValue> calibratedValues(const NominalFreedom& freedom, const FitResult& fit);
+
 /// Nominal values that the fitted tests determine differently than stated, most deviations first; at least
 /// the one with the most.
 /// @param fit without effects, with covariance

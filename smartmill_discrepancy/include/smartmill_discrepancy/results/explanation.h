@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "smartmill_discrepancy/explain/inspection_check.h"
 #include "smartmill_discrepancy/results/candidate_result.h"
 #include "smartmill_discrepancy/results/finding.h"
+#include "smartmill_discrepancy/results/test_outcome.h"
 
 namespace smartmill::discrepancy {
 
@@ -37,6 +39,14 @@ struct FoundParameter {
   double known() const { return modulo > 0.0 ? value - modulo * std::floor(value / modulo) : value; }
 };
 
+/// An effect fitted in place of another one.
+struct Rival {
+  std::string name;
+  double delta_bic = 0.0;                  ///< BIC gain against the model without either
+  std::vector<FoundParameter> parameters;  ///< without standard deviations
+  double heldout_gap = 0.0;                ///< of the model with it; 0: no held-out tests
+};
+
 /// A nominal value that the records determine differently than the model states.
 struct RecalibratedValue {
   std::string name;         ///< key in the model file, "cutting.ktc_n_per_mm2"
@@ -56,7 +66,9 @@ struct FoundEffect {
   /// [1] probability that it reduces the gap of tests outside the fit, compared with no effect and with each
   /// alternative (ValidationResult) except those of not_separable that predict the same in every test
   double confidence = 0.0;
-  std::vector<std::pair<std::string, double>> alternatives;  ///< other effects instead of it: name, delta_bic
+  double presence = 0.0;            ///< [1] the same compared with no effect only
+  double heldout_without = 0.0;     ///< gap of the model refitted without it; 0: no held-out tests
+  std::vector<Rival> alternatives;  ///< other effects instead of it
 };
 
 /// Rejected effect of the catalogue that is closest to the residual.
@@ -109,6 +121,14 @@ struct ChatteringCut {
   double before = 0.0, after = 0.0;
 };
 
+/// A test of the campaign.
+struct ReportedTest {
+  CampaignTest test;
+  double duration = 0.0;  ///< [s] of its record
+  bool heldout = false;
+  bool left_out = false;  ///< it chatters and is not compared
+};
+
 struct GapPair {
   double fit = 0.0, heldout = 0.0;
 };
@@ -123,6 +143,7 @@ struct Explanation {
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;
   std::optional<CampaignTest> suggested_cut;  ///< suggested_test for programs
+  std::optional<TestOutcome> outcome;         ///< predictions of suggested_cut
   GapPair before, after;
   std::optional<GapPair> named_only;  ///< gap without the empirical effects, if there are any
   std::string sentence;               ///< summary for the machinist; may be empty
@@ -134,7 +155,13 @@ struct Explanation {
   std::vector<ChatteringCut> chattering;  ///< used in the fit
   std::vector<RevolutionCurve> revolutions;
   std::vector<SpectrumCurve> spectra;
-  MachineModel model;                  ///< the improved model, as written
+  std::vector<ReportedTest> tests;
+  std::map<std::string, double> noise;  ///< RMS of each channel [unit of the channel]
+  MachineModel nominal;                 ///< the supplied model
+  MachineModel model;                   ///< the corrected model, as written
+  std::vector<RecalibratedValue>
+      calibrated;                      ///< all free values of the corrected model, most deviations first
+  std::size_t testable = 0;            ///< effects of the catalogue that the records can show
   bool interrupted = false;            ///< cancelled: effects found until then
   std::optional<double> spent_budget;  ///< [s] time budget that ended a stage: effects found until then
   std::vector<std::string> not_tried;  ///< effects of the catalogue that either has left untried

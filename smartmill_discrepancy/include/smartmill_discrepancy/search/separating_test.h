@@ -6,6 +6,7 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/data/dataset.h"
+#include "smartmill_discrepancy/results/test_outcome.h"
 
 namespace smartmill::discrepancy {
 
@@ -17,6 +18,7 @@ struct SeparatingTest {
   std::string text;         ///< description
   CampaignTest test;        ///< as a new test of the campaign
   double difference = 0.0;  ///< [1] RMS difference of the predictions over the noise
+  TestOutcome outcome;      ///< without the names of the models
 };
 
 /// The cut or air cut with the largest difference of two models among variations of the campaign's tests.

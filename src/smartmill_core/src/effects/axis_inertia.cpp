@@ -8,12 +8,13 @@ class AxisInertia : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"axis_inertia", EffectStage::sensor_force, 30};
+    kind.title = "moving mass on the force sensor";
     kind.description =
         "the sensor moves with an axis: minus mass x acceleration of the axis acts on it along the axis";
     kind.source = "d'Alembert's force of table, sensor and workpiece";
-    kind.advice = "install the model, or use records at constant feed only";
+    kind.advice = "use the corrected model, or records at constant feed only";
     kind.parameters = {oneOf("axis", axisNames()),
-                       number("mass_kg", "kg", Range::notNegative()).drawn(5.0, 60.0)};
+                       number("mass_kg", "kg", Range::notNegative()).named("moving mass").drawn(5.0, 60.0)};
     kind.needs = {EffectNeed::forces, EffectNeed::axis_motion};
     kind.forms = [](const Scope& s) {
       Forms forms;

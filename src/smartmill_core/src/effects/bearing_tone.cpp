@@ -30,6 +30,7 @@ class BearingTone : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"bearing_tone", EffectStage::signal, 20};
+    kind.title = "tone of a spindle bearing";
     kind.description =
         "sine at a multiple of the spindle speed on the sensor, x, y and z in phase, while the spindle "
         "turns; the "
@@ -39,9 +40,11 @@ class BearingTone : public Effect {
         "0.4 and "
         "0.6 per rolling element (races)";
     kind.advice = "compare the order with the data sheets of the spindle's bearings, and watch its size";
-    kind.parameters = {number("order", "1", Range::positive()).drawn(0.35, 12.0),
-                       orZero("x_n", "N").drawn(2.0, 8.0), orZero("y_n", "N").drawn(2.0, 8.0),
-                       orZero("z_n", "N").drawn(2.0, 8.0)};
+    kind.parameters = {
+        number("order", "1", Range::positive()).named("times per revolution").drawn(0.35, 12.0),
+        orZero("x_n", "N").named("amplitude along x").drawn(2.0, 8.0),
+        orZero("y_n", "N").named("amplitude along y").drawn(2.0, 8.0),
+        orZero("z_n", "N").named("amplitude along z").drawn(2.0, 8.0)};
     kind.needs = {EffectNeed::forces};
     kind.remark = bearingPartsWith;
     kind.draw = [](const MachineModel&, EffectKind::Random& random, EffectEntry& entry) {

@@ -8,6 +8,7 @@ class ChannelDelay : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"channel_delay", EffectStage::delay, 10};
+    kind.title = "one channel is recorded late";
     kind.description = "one channel is delayed";
     kind.source = "filters and converters of one channel";
     kind.advice = "check the filters and the converter of this channel";

@@ -8,12 +8,19 @@ class ChipCoefficients : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"chip_coefficients", EffectStage::cutting_law, 40};
+    kind.title = "other cutting force of the material";
     kind.description = "adds to the chip coefficients";
     kind.source = "Dunwoody eq. 2.1: coefficients of another material, or of a regression biased by runout";
-    kind.advice = "check material and hardness; install the model if they are as they should be";
-    kind.parameters = {orZero("Ktc_n_per_mm2", "N/mm2").drawnOnBothSides(120.0, 300.0),
-                       orZero("Krc_n_per_mm2", "N/mm2").drawnOnBothSides(50.0, 110.0),
-                       orZero("Kac_n_per_mm2", "N/mm2").drawnOnBothSides(30.0, 90.0)};
+    kind.advice = "check material and hardness; if they are those of the model, use the corrected model";
+    kind.parameters = {orZero("Ktc_n_per_mm2", "N/mm2")
+                           .named("additional tangential chip coefficient")
+                           .drawnOnBothSides(120.0, 300.0),
+                       orZero("Krc_n_per_mm2", "N/mm2")
+                           .named("additional radial chip coefficient")
+                           .drawnOnBothSides(50.0, 110.0),
+                       orZero("Kac_n_per_mm2", "N/mm2")
+                           .named("additional axial chip coefficient")
+                           .drawnOnBothSides(30.0, 90.0)};
     kind.needs = {EffectNeed::cuts};
     kind.forms = [](const Scope& s) {
       const CuttingCoefficients k = s.nominal.cutting.value_or(CuttingCoefficients{});

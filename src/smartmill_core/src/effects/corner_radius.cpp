@@ -9,6 +9,7 @@ class CornerRadius : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"corner_radius", EffectStage::geometry, 50};
+    kind.title = "other corner radius of the tool";
     kind.description =
         "bull-nose or ball end: below this height the edge's normal turns from radial to axial; chip, local "
         "radius and direction of the forces follow; replaces the nominal corner radius";

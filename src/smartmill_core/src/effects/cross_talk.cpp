@@ -18,10 +18,14 @@ class CrossTalk : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"cross_talk", EffectStage::sensor_output, 10};
+    kind.title = "cross-talk of the force channels";
     kind.description = "xy: share of the y signal in the x channel, the others alike";
     kind.source = "Kistler, data sheets of multi-component dynamometers";
     kind.advice = "calibrate the force sensor with its cross-talk (kalman/calibrate)";
-    for (const char* pair : PAIRS) kind.parameters.push_back(orZero(pair, "1").drawnOnBothSides(0.02, 0.08));
+    for (const char* pair : PAIRS) {
+      kind.parameters.push_back(orZero(pair, "1").drawnOnBothSides(0.02, 0.08));
+      kind.parameters.back().name = std::string("share of f") + pair[1] + " in f" + pair[0];
+    }
     kind.needs = {EffectNeed::forces};
     kind.forms = [](const Scope&) {
       std::vector<EffectCoordinates> shares;

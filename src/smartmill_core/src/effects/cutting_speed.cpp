@@ -8,11 +8,14 @@ class CuttingSpeed : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"cutting_speed", EffectStage::cutting_law, 30};
+    kind.title = "cutting force that changes with the cutting speed";
     kind.description = "Kc multiplied by (v / reference)^-exponent";
     kind.source = "Altintas, Manufacturing Automation, 2.4";
-    kind.advice = "install the model: the coefficients depend on the cutting speed";
-    kind.parameters = {number("exponent", "1").drawn(0.05, 0.25),
-                       number("reference_m_per_min", "m/min", Range::positive()).drawn(100.0, 300.0)};
+    kind.advice = "use the corrected model: it contains the dependence on the cutting speed";
+    kind.parameters = {number("exponent", "1").named("exponent of the cutting speed").drawn(0.05, 0.25),
+                       number("reference_m_per_min", "m/min", Range::positive())
+                           .named("cutting speed with the force of the supplied model")
+                           .drawn(100.0, 300.0)};
     kind.needs = {EffectNeed::cuts};
     // A level without a slope cannot be written: every point has some slope.
     kind.forms = always(EffectForm({powerLaw("exponent", "reference_m_per_min", 150.0, 1.0, 5000.0)})

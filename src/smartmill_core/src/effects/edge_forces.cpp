@@ -8,12 +8,14 @@ class EdgeForces : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"edge_forces", EffectStage::cutting_law, 10};
+    kind.title = "other edge force (rubbing of the edge)";
     kind.description = "adds to the edge coefficients";
     kind.source = "Dunwoody eq. 2.1; Armarego & Deshpande 1991";
-    kind.advice = "compare the edge with a new one; install the model if it is as it should be";
-    kind.parameters = {orZero("Kte_n_per_mm", "N/mm").drawn(4.0, 15.0),
-                       orZero("Kre_n_per_mm", "N/mm").drawn(4.0, 15.0),
-                       orZero("Kae_n_per_mm", "N/mm").drawn(0.5, 4.0)};
+    kind.advice = "compare the edge with a new one; if it is as new, use the corrected model";
+    kind.parameters = {
+        orZero("Kte_n_per_mm", "N/mm").named("additional tangential edge coefficient").drawn(4.0, 15.0),
+        orZero("Kre_n_per_mm", "N/mm").named("additional radial edge coefficient").drawn(4.0, 15.0),
+        orZero("Kae_n_per_mm", "N/mm").named("additional axial edge coefficient").drawn(0.5, 4.0)};
     kind.needs = {EffectNeed::cuts};
     kind.forms = [](const Scope& s) {
       const CuttingCoefficients k = s.nominal.cutting.value_or(CuttingCoefficients{});

@@ -32,13 +32,14 @@ class ExtraMode : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"extra_mode", EffectStage::sensor, 30};
+    kind.title = "resonance of the force sensor or its clamping";
     kind.description = "one more mode in the force sensor; its gain is taken from the direct share";
     kind.source = "Dunwoody eq. 5.5";
     kind.advice = "check how sensor and workpiece are clamped, and repeat the taps on the workpiece";
     kind.parameters = {oneOf("axis", axisNames()),
                        number("frequency_hz", "Hz", Range::positive()).drawn(300.0, 3500.0),
                        number("damping_ratio", "1", Range::open(0.0, 1.0)).drawn(0.01, 0.05),
-                       number("gain", "1").drawn(0.03, 0.09)};
+                       number("gain", "1").named("share of the force that excites it").drawn(0.03, 0.09)};
     kind.needs = {EffectNeed::forces};
     kind.forms = modeForms;
     return kind;

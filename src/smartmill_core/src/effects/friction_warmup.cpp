@@ -9,12 +9,16 @@ class FrictionWarmup : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"friction_warmup", EffectStage::drive, 20};
+    kind.title = "spindle friction that falls as the spindle warms up";
     kind.description =
         "spindle friction (Stribeck's included) multiplied by 1 + cold x exp(-start_time / constant)";
     kind.source = "Dunwoody 3.2.1: friction falls as the spindle warms up";
     kind.advice = "warm the spindle up before measuring";
-    kind.parameters = {number("cold_ratio", "1").drawn(0.2, 0.8),
-                       number("time_constant_s", "s", Range::positive()).drawn(120.0, 500.0)};
+    kind.parameters = {
+        number("cold_ratio", "1")
+            .named("additional friction of the cold spindle over that of the warm one")
+            .drawn(0.2, 0.8),
+        number("time_constant_s", "s", Range::positive()).named("time constant").drawn(120.0, 500.0)};
     kind.needs = {EffectNeed::load_meter, EffectNeed::start_time};
     kind.forms =
         always(EffectForm({amplitude("cold_ratio", {-0.9, 20.0, 0.000125, 0.5}),

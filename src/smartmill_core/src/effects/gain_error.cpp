@@ -8,11 +8,13 @@ class GainError : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"gain_error", EffectStage::sensor_output, 20};
+    kind.title = "wrong sensitivity of one channel";
     kind.description = "one channel's sensitivity is wrong: it indicates gain times the value";
     kind.source = "calibration of one channel";
     kind.advice = "check the stated sensitivity of this channel with a known weight";
-    kind.parameters = {oneOf("channel", measuredChannels()).drawnFromFirst(4),
-                       number("gain", "1").drawnOnBothSides(0.06, 0.2, 1.0)};
+    kind.parameters = {
+        oneOf("channel", measuredChannels()).drawnFromFirst(4),
+        number("gain", "1").named("indicated over true value").drawnOnBothSides(0.06, 0.2, 1.0)};
     kind.forms = [](const Scope& s) {
       Forms forms;
       for (const std::string& channel : s.channels) {

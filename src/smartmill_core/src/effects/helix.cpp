@@ -8,10 +8,11 @@ class Helix : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"helix", EffectStage::geometry, 40};
+    kind.title = "other helix angle of the tool";
     kind.description = "helix angle, replaces the nominal one";
     kind.source = "Dunwoody eq. 5.64";
     kind.advice = "measure the helix angle and state it in the model";
-    kind.parameters = {number("helix_deg", "deg", Range::openHigh(0.0, 80.0))};
+    kind.parameters = {number("helix_deg", "deg", Range::openHigh(0.0, 80.0)).named("helix angle")};
     kind.needs = {EffectNeed::cuts};
     kind.forms = [](const Scope& s) {
       const double helix = units::degFromRad(s.nominal.tool->helix);

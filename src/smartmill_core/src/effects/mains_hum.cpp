@@ -8,12 +8,14 @@ class MainsHum : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"mains_hum", EffectStage::signal, 30};
+    kind.title = "mains hum in the force signals";
     kind.description = "sine on fx, y_ratio of it in phase on fy; the phase is estimated from each record";
     kind.source = "coupling of the mains into the charge lines";
     kind.advice = "check grounding and shield of the sensor cables";
-    kind.parameters = {oneOfNumbers("frequency_hz", "Hz", {50.0, 60.0}),
-                       number("amplitude_n", "N").drawn(2.0, 12.0),
-                       number("y_ratio", "1").drawnOnBothSides(0.3, 1.2)};
+    kind.parameters = {
+        oneOfNumbers("frequency_hz", "Hz", {50.0, 60.0}).named("frequency"),
+        number("amplitude_n", "N").named("amplitude in fx").drawn(2.0, 12.0),
+        number("y_ratio", "1").named("amplitude in fy over that in fx").drawnOnBothSides(0.3, 1.2)};
     kind.needs = {EffectNeed::plane_forces};
     kind.forms = [](const Scope&) {
       Forms forms;

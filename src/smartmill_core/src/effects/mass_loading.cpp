@@ -9,11 +9,14 @@ class MassLoading : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"mass_loading", EffectStage::sensor, 10};
+    kind.title = "heavier or lighter workpiece on the force sensor";
     kind.description =
         "the first sensor mode of each axis falls by 1/sqrt(1 + ratio), damping ratio unchanged";
     kind.source = "Dunwoody 5.2: workpiece mass on the dynamometer";
     kind.advice = "repeat the taps with the present workpiece";
-    kind.parameters = {number("mass_ratio", "1", Range::above(-1.0)).drawn(0.08, 0.4)};
+    kind.parameters = {number("mass_ratio", "1", Range::above(-1.0))
+                           .named("additional mass over the moving mass of the sensor")
+                           .drawn(0.08, 0.4)};
     kind.needs = {EffectNeed::forces, EffectNeed::sensor_modes};
     // In the logarithm the mass acts exactly as the modes' stated frequencies do, all at once. The response
     // of a lightly damped mode is proportional only while it moves by less than its width.

@@ -9,12 +9,16 @@ class ProcessDamping : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"process_damping", EffectStage::cutting_law, 70};
+    kind.title = "vibration damped by the edge at low speed";
     kind.description =
         "radial force C v_r / v_c per mm of engaged edge, v_r the velocity into the work; tangential 0.3 of "
         "it";
     kind.source = "Tunc & Budak 2012; Altintas, Eynian & Onozuka 2008";
-    kind.advice = "install the model: at low speeds deeper cuts are stable than the model predicts";
-    kind.parameters = {number("coefficient_n_per_mm", "N/mm").drawn(150.0, 800.0)};
+    kind.advice =
+        "use the corrected model: at low speeds deeper cuts are stable than the supplied one predicts";
+    kind.parameters = {number("coefficient_n_per_mm", "N/mm")
+                           .named("damping force at a velocity into the work equal to the cutting speed")
+                           .drawn(150.0, 800.0)};
     kind.needs = {EffectNeed::cuts, EffectNeed::flexible_tool};
     kind.forms = always(EffectForm({amplitude("coefficient_n_per_mm", {-1e4, 1e6, 0.125, 2000.0})})
                             .straight({50.0, 300.0, 1500.0}));

@@ -10,10 +10,15 @@ class Runout : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"runout", EffectStage::geometry, 20};
+    kind.title = "tool axis off centre";
     kind.description = "tooth j cuts at radius R + offset cos(angle - position of tooth j)";
     kind.source = "Kline & DeVor 1983; Dunwoody 6.1";
-    kind.advice = "check the seat of the tool in its holder and the taper with a dial indicator";
-    kind.parameters = {number("offset_um", "um", Range::notNegative()).drawn(5.0, 25.0), angle("angle_deg")};
+    kind.advice =
+        "put a dial indicator on the shank and turn the spindle by hand; clean taper, collet and nut, clamp "
+        "again and repeat until the reading is within the tolerance of the holder";
+    kind.parameters = {
+        number("offset_um", "um", Range::notNegative()).named("tool axis off centre by").drawn(5.0, 25.0),
+        angle("angle_deg")};
     kind.needs = {EffectNeed::cuts};
     kind.forms =
         always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0, 15.0}));

@@ -10,10 +10,13 @@ class Saturation : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"saturation", EffectStage::signal, 40};
+    kind.title = "clipped force signals";
     kind.description = "fx, fy and fz clipped at plus and minus the limit";
     kind.source = "range of the charge amplifier";
     kind.advice = "increase the range of the amplifier and repeat the cuts";
-    kind.parameters = {number("limit_n", "N", Range::positive()).drawn(150.0, 350.0)};
+    kind.parameters = {number("limit_n", "N", Range::positive())
+                           .named("force at which the signal is clipped")
+                           .drawn(150.0, 350.0)};
     kind.needs = {EffectNeed::forces};
     kind.forms = [](const Scope& s) {
       const double most = s.largest_force;

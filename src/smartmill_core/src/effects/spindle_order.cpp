@@ -9,17 +9,19 @@ class SpindleOrder : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"spindle_order", EffectStage::sensor_force, 20};
+    kind.title = "force locked to the spindle angle";
     kind.description =
         "x_n sin(order x spindle angle + x_deg), y and z alike, on the sensor while the spindle turns";
     kind.source = "bearings, drive and draw bar: lines locked to the spindle angle";
     kind.advice = "check bearings, drive and draw bar of the spindle";
-    kind.parameters = {number("order", "1", Range::positive()).drawn(0.35, 12.0),
-                       orZero("x_n", "N").drawn(2.0, 8.0),
-                       orZero("y_n", "N").drawn(2.0, 8.0),
-                       orZero("z_n", "N").drawn(2.0, 8.0),
-                       angleOrZero("x_deg"),
-                       angleOrZero("y_deg"),
-                       angleOrZero("z_deg")};
+    kind.parameters = {
+        number("order", "1", Range::positive()).named("times per revolution").drawn(0.35, 12.0),
+        orZero("x_n", "N").named("amplitude along x").drawn(2.0, 8.0),
+        orZero("y_n", "N").named("amplitude along y").drawn(2.0, 8.0),
+        orZero("z_n", "N").named("amplitude along z").drawn(2.0, 8.0),
+        angleOrZero("x_deg").named("phase along x at spindle angle 0"),
+        angleOrZero("y_deg").named("phase along y at spindle angle 0"),
+        angleOrZero("z_deg").named("phase along z at spindle angle 0")};
     kind.needs = {EffectNeed::forces};
     kind.forms = always(
         EffectForm({amplitude("order", {0.05, 60.0, 2e-4, 20.0}, 1.0),

@@ -19,10 +19,11 @@ class ThermalGrowth : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"thermal_growth", EffectStage::motion, 30};
+    kind.title = "spindle and tool that grow as they warm up";
     kind.description = "the axial depth of a cut grows by growth x (1 - exp(-start_time / constant))";
     kind.source = "Ramesh, Mannan & Poo 2000: spindle and tool grow as they warm up";
     kind.advice = "warm the machine up, and measure the length of the tool again";
-    kind.parameters = {number("growth_um", "um").drawn(30.0, 120.0),
+    kind.parameters = {number("growth_um", "um").named("growth when warm").drawn(30.0, 120.0),
                        number("time_constant_s", "s", Range::positive()).drawn(120.0, 500.0)};
     kind.needs = {EffectNeed::cuts, EffectNeed::start_time};
     kind.forms = growthForms;

@@ -18,6 +18,7 @@ class ToolFlexibility : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"tool_flexibility", EffectStage::structure, 10};
+    kind.title = "vibrating tool (a resonance is missing)";
     kind.description = "modes added to the tool tip's: it vibrates and the chip regenerates";
     kind.source = "Dunwoody 2.2; Altintas & Budak 1995";
     kind.advice = "measure the FRF of the tool tip with the hammer";

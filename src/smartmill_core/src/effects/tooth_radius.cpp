@@ -19,12 +19,15 @@ class ToothRadius : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"tooth_radius", EffectStage::geometry, 30};
+    kind.title = "teeth of unequal radius";
     kind.description =
         "tooth j cuts at radius R + offset[j]: a chipped, re-ground or badly seated insert; only differences "
         "act";
     kind.source = "Kline & DeVor 1983, with a radius for each tooth";
-    kind.advice = "check the inserts: one is chipped, reground or badly seated";
-    kind.parameters = {perTooth("offset_um", "um")};
+    kind.advice =
+        "measure the radius of each tooth in the presetter or with the laser; replace or reseat the insert "
+        "that differs";
+    kind.parameters = {perTooth("offset_um", "um").named("deviation of the radius")};
     kind.needs = {EffectNeed::cuts, EffectNeed::several_teeth};
     kind.forms = [](const Scope& s) {
       return Forms{EffectForm({contrasts("offset_um", s.nominal.tool->teeth, {-200.0, 200.0, 5e-4, 20.0})})

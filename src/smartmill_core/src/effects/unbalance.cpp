@@ -8,11 +8,15 @@ class Unbalance : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"unbalance", EffectStage::sensor_force, 10};
+    kind.title = "unbalance of tool and holder";
     kind.description =
         "m e omega^2 on the sensor: x sin(a), y cos(a), a = spindle angle + angle; the tip does not move";
     kind.source = "ISO 21940-11";
-    kind.advice = "balance the tool in its holder";
-    kind.parameters = {number("mass_eccentricity_g_mm", "g mm", Range::notNegative()).drawn(4.0, 20.0),
+    kind.advice =
+        "balance the tool in its holder, or stay below the speed at which the rotating force is acceptable";
+    kind.parameters = {number("mass_eccentricity_g_mm", "g mm", Range::notNegative())
+                           .named("unbalance, mass times distance")
+                           .drawn(4.0, 20.0),
                        angle("angle_deg")};
     kind.needs = {EffectNeed::forces};
     kind.forms = always(

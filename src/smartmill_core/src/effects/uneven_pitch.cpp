@@ -18,10 +18,12 @@ class UnevenPitch : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"uneven_pitch", EffectStage::geometry, 10};
+    kind.title = "unevenly spaced teeth";
     kind.description = "teeth not evenly spaced; the feed of each tooth is in proportion to its pitch";
     kind.source = "Budak 2003";
     kind.advice = "state the measured pitch of the teeth in the model";
-    kind.parameters = {perTooth("pitch_deg", "deg", Range::positive(), 360.0)};
+    kind.parameters = {
+        perTooth("pitch_deg", "deg", Range::positive(), 360.0).named("angle to the next tooth")};
     kind.needs = {EffectNeed::cuts, EffectNeed::several_teeth};
     kind.forms = [](const Scope& s) {
       return Forms{

@@ -10,10 +10,14 @@ class ZeroOffset : public Effect {
  public:
   static EffectKind declaration() {
     EffectKind kind{"zero_offset", EffectStage::signal, 10};
+    kind.title = "wrong zero of the force channels";
     kind.description = "a constant on each force channel";
     kind.source = "Kistler, charge amplifiers: zero after the last reset";
     kind.advice = "zero the amplifier before each record";
-    for (const char* key : KEYS) kind.parameters.push_back(orZero(key, "N").drawnOnBothSides(2.0, 15.0));
+    for (const char* key : KEYS) {
+      kind.parameters.push_back(orZero(key, "N").drawnOnBothSides(2.0, 15.0));
+      kind.parameters.back().name = std::string("zero of f") + key[0];
+    }
     kind.needs = {EffectNeed::forces};
     std::vector<EffectCoordinates> offsets;
     for (const char* key : KEYS) offsets.push_back(amplitude(key, {-2000.0, 2000.0, 5e-4, 30.0}));

@@ -46,17 +46,34 @@ dialog { border: 0; padding: 0; width: 100vw; height: 100vh; max-width: none; ma
   background: #0f1419ee; overflow: hidden; touch-action: none; cursor: grab; }
 dialog img { position: absolute; left: 0; top: 0; transform-origin: 0 0; background: #fff; user-select: none; }
 dialog p { position: absolute; left: 16px; bottom: 8px; margin: 0; color: #edf2f7; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 10px; }
+details > summary { cursor: pointer; font-size: 18px; font-weight: 650; margin: 30px 0 8px; }
+.dim { color: var(--dim); }
+pre { background: var(--raised); border-radius: 8px; padding: 8px 12px; margin: 4px 0; overflow-x: auto; font-size: 14px; }
+.level1 { background: #fdd49e; color: #131a21; } .level2 { background: #fc8d59; color: #131a21; }
+.level3 { background: #d7301f; color: #ffffff; } .level4 { background: #7f0000; color: #ffffff; }
+td[class*=level] { padding-left: 6px; border-left: 2px solid var(--card); }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(440px, 100%), 1fr)); gap: 10px; }
 .plot { background: var(--card); border-radius: 12px; padding: 8px 10px; break-inside: avoid; }
 .plot h3 { font-size: 15px; font-weight: 500; margin: 0 0 4px; }
 .plot svg { width: 100%; height: auto; display: block; touch-action: none; cursor: crosshair; }
 .plot text { fill: var(--dim); font-size: 12px; } .plot .axis { stroke: var(--grid); stroke-width: 1; }
 .plot p { margin: 2px 0 0; font-size: 13px; color: var(--dim); min-height: 18px; }
 select { background: var(--raised); color: var(--text); border: 0; border-radius: 8px; padding: 8px 12px; font-size: 15px; }
+@media (max-width: 700px) {
+  .stack tr, .stack td { display: block; } .stack tr:first-child { display: none; }
+  .stack tr + tr { border-top: 2px solid var(--dim); } .stack td { border: 0; }
+  .stack td::before { content: attr(data-head); display: block; color: var(--dim); font-size: 13px; }
+}
+@page { size: A4; margin: 12mm; }
 @media print {
   body, .verdict, .table, .plot { background: #fff; }
-  button, select { display: none; } .table { overflow: visible; } body { font-size: 12px; }
+  button, select { display: none; } .table { overflow: visible; padding: 0; margin: 4px 0; }
+  body { font-size: 12px; } h1 { font-size: 19px; margin: 0 0 6px; } h2, details > summary { font-size: 14px; margin: 12px 0 4px; }
+  p, ul, ol { margin: 5px 0; } table { font-size: 11px; } th, td { padding: 2px 8px 2px 0; } pre { font-size: 10px; white-space: pre-wrap; }
+  .verdict { font-size: 14px; padding: 0; }
   main { max-width: none; padding: 0; } tr, figure { break-inside: avoid; } h2 { break-after: avoid; }
+  .page { break-before: page; } .plots { grid-template-columns: 1fr 1fr; }
+  td[class*=level] { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 }
 )";
 
@@ -64,7 +81,7 @@ constexpr const char* SCRIPT = R"(
 const root = document.documentElement;
 const setTheme = theme => { root.dataset.theme = theme; };
 setTheme(matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
-addEventListener('beforeprint', () => setTheme('light'));
+addEventListener('beforeprint', () => { setTheme('light'); for (const part of document.querySelectorAll('details')) part.open = true; });
 document.querySelector('button').onclick = () => setTheme(root.dataset.theme === 'dark' ? 'light' : 'dark');
 
 const numberIn = text => { const found = text.match(/^[^\d\-+.]*([-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)/i); return found ? +found[1] : NaN; };
@@ -73,7 +90,8 @@ for (const table of document.querySelectorAll('table')) {
   const box = document.createElement('div');
   box.className = 'table'; table.replaceWith(box); box.append(table);
   for (const row of rows) for (const cell of row.cells) {
-    if (/^[-+<>=\d.e %]+$/.test(cell.textContent) && /\d/.test(cell.textContent)) cell.className = 'number';
+    if (/^[-+<>=\d.e %]+$/.test(cell.textContent) && /\d/.test(cell.textContent)) cell.classList.add('number');
+    cell.dataset.head = head.cells[cell.cellIndex]?.textContent ?? '';
     if (/^(met|yes)$/.test(cell.textContent)) cell.className = 'good';
     if (/^MISSED/.test(cell.textContent)) cell.className = 'bad';
   }
@@ -157,6 +175,14 @@ for (const box of document.querySelectorAll('.plot')) {
     }
     element(svg, 'text', { x: (L + W - R) / 2, y: H - 6, 'text-anchor': 'middle' }, data.x_label);
     element(svg, 'text', { transform: `translate(13 ${(H - B + T) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, data.y_label);
+    let free = 0;  // right of the last text
+    for (const mark of data.marks ?? []) {
+      if (mark.x < view.x0 || mark.x > view.x1) continue;
+      element(svg, 'line', { x1: px(mark.x), x2: px(mark.x), y1: T, y2: H - B, stroke: 'var(--dim)', 'stroke-dasharray': '3 3' });
+      if (px(mark.x) < free) continue;
+      element(svg, 'text', { x: px(mark.x) + 3, y: T + 11 }, mark.text);
+      free = px(mark.x) + 24;
+    }
     const inside = element(svg, 'svg', { x: L, y: T, width: W - L - R, height: H - B - T, viewBox: `${L} ${T} ${W - L - R} ${H - B - T}` });
     for (const curve of data.curves) {
       let path = '', pen = false;
@@ -167,7 +193,7 @@ for (const box of document.querySelectorAll('.plot')) {
         path += curve.dots ? `M${at}h0` : (pen ? 'L' : 'M') + at;
         pen = true;
       });
-      element(inside, 'path', { d: path, fill: 'none', stroke: curve.colour, 'stroke-width': curve.dots ? 4 : 1.5, 'stroke-linecap': 'round' });
+      element(inside, 'path', { d: path, fill: 'none', stroke: curve.colour, 'stroke-width': curve.dots ? 3 : 1.5, 'stroke-linecap': 'round' });
     }
   };
   const at = event => {
@@ -353,6 +379,7 @@ void ReportPage::plot(const PagePlot& plot) {
                               {"x", numbers(curve.x)},
                               {"y", numbers(curve.y)}});
   }
+  for (const PagePlot::Mark& mark : plot.marks) data["marks"].push_back({{"x", mark.x}, {"text", mark.text}});
   // Within a script element only "</" ends it.
   std::string json = data.dump();
   for (std::size_t k = 0; (k = json.find("</", k)) != std::string::npos; k += 3) json.replace(k, 2, "<\\/");

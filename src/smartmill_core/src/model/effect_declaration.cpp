@@ -30,7 +30,8 @@ EffectParameter orZero(const char* key, const char* unit, const Range& range) {
 }
 
 EffectParameter angle(const char* key) {
-  EffectParameter p = number(key, "deg").drawn(0.0, 360.0);
+  EffectParameter p =
+      number(key, "deg").drawn(0.0, 360.0).named("its direction, from tooth 1 in the direction of rotation");
   p.period = 360.0;
   p.on_spindle = true;
   return p;

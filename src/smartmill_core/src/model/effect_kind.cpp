@@ -87,6 +87,7 @@ bool EffectParameter::allows(double number) const {
 }
 
 std::string EffectParameter::quantity() const {
+  if (!name.empty()) return name;
   std::string suffix;  // as keys end in their unit: "_n_per_mm2" of "N/mm2"
   for (const char c : unit == "N m" ? std::string("nm") : unit)
     suffix += c == '/' ? "_per_" : c == ' ' ? "_" : std::string(1, static_cast<char>(std::tolower(c)));
@@ -129,6 +130,12 @@ EffectParameter EffectParameter::drawnOnBothSides(double low, double high, doubl
 EffectParameter EffectParameter::drawnFromFirst(std::size_t count) const {
   EffectParameter p = *this;
   p.words_drawn = count;
+  return p;
+}
+
+EffectParameter EffectParameter::named(const std::string& quantity) const {
+  EffectParameter p = *this;
+  p.name = quantity;
   return p;
 }
 

@@ -43,10 +43,12 @@ TEST(ReportPage, PlotsKeepTheirDataAndEscapeIt) {
   plot.title = "fx < fy";
   plot.x_label = "angle [deg]";
   plot.curves = {{"</script>", "#000", false, {0.0, 1.0, 2.0}, {1234.5678, NAN, -2e-7}}};
+  plot.marks = {{1.5, "2x"}};
   page.plot(plot);
   const std::string text = page.text();
   EXPECT_NE(text.find("<h3>fx &lt; fy</h3>"), std::string::npos);
   EXPECT_NE(text.find("[1234.568,null,-2e-07]"), std::string::npos) << text;
+  EXPECT_NE(text.find("\"marks\":[{\"x\":1.5,\"text\":\"2x\"}]"), std::string::npos) << text;
   EXPECT_NE(text.find("\"name\":\"<\\/script>\""), std::string::npos);
 }
 

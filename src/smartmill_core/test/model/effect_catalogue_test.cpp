@@ -57,6 +57,10 @@ TEST(EffectCatalogue, everyEntryIsComplete) {
     EXPECT_TRUE(names.insert(kind.name).second) << kind.name << " occurs twice";
     EXPECT_EQ(findEffect(kind.name), &kind);
     EXPECT_FALSE(kind.description.empty()) << kind.name;
+    EXPECT_FALSE(kind.title.empty()) << kind.name;
+    EXPECT_EQ(kind.title.find('_'), std::string::npos)
+        << kind.name << ": words of a shop, not a name of the program";
+    EXPECT_FALSE(kind.advice.empty()) << kind.name;
     EXPECT_FALSE(kind.source.empty()) << kind.name;
     EXPECT_FALSE(kind.parameters.empty()) << kind.name;
     EXPECT_FALSE(formsOf(kind, scopeOf(model)).empty()) << kind.name;
@@ -109,6 +113,13 @@ TEST(EffectCatalogue, hasTheNamesThatOtherProgramsUse) {
     EXPECT_EQ(own, keys) << name;
   }
   EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
+}
+
+TEST(EffectCatalogue, namesQuantitiesInWords) {
+  EXPECT_EQ(parameterOf(*findEffect("runout"), "offset_um").quantity(), "tool axis off centre by");
+  EXPECT_EQ(parameterOf(*findEffect("cross_talk"), "xy").quantity(), "share of fy in fx");
+  EXPECT_EQ(parameterOf(*findEffect("thermal_growth"), "time_constant_s").quantity(), "time constant");
+  EXPECT_EQ(parameterOf(*findEffect("spindle_order"), "z_n").quantity(), "amplitude along z");
 }
 
 TEST(EffectCatalogue, anglesHaveTheShorterDifference) {

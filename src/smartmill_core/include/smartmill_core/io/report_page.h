@@ -18,14 +18,20 @@ struct PagePlot {
     bool is_dots = false;  ///< not joined by a line
     std::vector<double> x, y;
   };
+  struct Mark {
+    double x = 0.0;
+    std::string text;
+  };
   std::string title, x_label, y_label;  ///< labels with their unit
   bool log_y = false;                   ///< values of 0 and below are not drawn
-  std::vector<Curve> curves;
+  std::vector<Curve> curves;            ///< later ones on top
+  std::vector<Mark> marks = {};         ///< dashed vertical lines
 };
 
 /// A report as one self-contained HTML file. All reports of the project share its style (the panel's colours,
-/// dark or light), tables that sort by a click on a column head, and pictures that open large, zoom with
-/// wheel or fingers and pan when dragged.
+/// dark or light), tables that sort by a click on a column head and scroll in their own box (of class
+/// "stack": whose cells are below each other on a phone), <details> that open when printed, and pictures that
+/// open large, zoom with wheel or fingers and pan when dragged.
 class ReportPage {
  public:
   explicit ReportPage(const std::string& title);

@@ -82,8 +82,9 @@ struct EffectParameter {
   bool on_spindle = false;              ///< angle of something that turns with the spindle, from tooth 1
   EffectDraw draw = {};
   std::size_t words_drawn = 0;  ///< only this many words, from the first, are drawn; 0: all
+  std::string name = {};        ///< its quantity in the words of a shop; empty: that of the key
 
-  /// Its quantity without the unit, as read aloud: "mass eccentricity" of mass_eccentricity_g_mm.
+  /// Its quantity without the unit: the name, or "time constant" of time_constant_s.
   std::string quantity() const;
   /// Whether files may contain this number.
   bool allows(double number) const;
@@ -97,6 +98,7 @@ struct EffectParameter {
   EffectParameter drawn(double low, double high) const;
   EffectParameter drawnOnBothSides(double low, double high, double about = 0.0) const;
   EffectParameter drawnFromFirst(std::size_t count) const;
+  EffectParameter named(const std::string& quantity) const;
 };
 
 /// Properties of a campaign that are known before any fit.
@@ -120,7 +122,8 @@ struct EffectKind {
   std::string name = {};
   EffectStage stage = EffectStage::geometry;
   int rank = 0;                  ///< within the stage: lower acts first
-  std::string description = {};  ///< one line
+  std::string title = {};        ///< the cause in the words of a shop: "tool axis off centre"
+  std::string description = {};  ///< one line: its law
   std::string source = {};       ///< publication or cause of the law
   std::string advice = {};       ///< for the machinist: what to do about it
   std::vector<EffectParameter> parameters = {};
