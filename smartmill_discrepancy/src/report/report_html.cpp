@@ -179,11 +179,9 @@ void causes(std::ostream& out, const Explanation& e) {
     }
     out << "<td>" << sureText(e, f) << "<td>" << rivalsText(e, f, conditions) << "</tr>\n";
   }
-  out << "</table>\n<p class=\"dim\">&plusmn; is the 95 % interval. Spindle angle 0: tooth 1 points to +y; "
-         "the spindle "
-         "turns clockwise, seen from above. Probability: that the cause also reduces the difference in "
-         "further "
-         "tests.</p>\n";
+  out << "</table>\n<p class=\"dim\">&plusmn; is the 95 % interval of the fit; errors of calibration and "
+         "clamping are not in it. Spindle angle 0: tooth 1 points to +y; the spindle turns clockwise, seen "
+         "from above. Probability: that the cause also reduces the difference in further tests.</p>\n";
 }
 
 void values(std::ostream& out, const char* title, const std::vector<RecalibratedValue>& list) {
@@ -293,6 +291,15 @@ void nextTest(std::ostream& out, const Explanation& e, const std::string& campai
   out << "\n" << measuredInstead(e);
 }
 
+std::string contentOfModel(const Explanation& e) {
+  if (e.effects.empty()) return "";
+  std::vector<std::string> titles;
+  for (const FoundEffect& f : e.effects) titles.push_back(causeTitle(f.name) + " (" + f.name + ")");
+  return "It contains " + joined(titles) +
+         " as they were in these tests: remove an entry of its section <code>effects</code> when its cause "
+         "is removed.";
+}
+
 void actions(std::ostream& out, const Explanation& e, const std::string& campaign,
              const std::string& folder) {
   std::vector<std::string> steps;
@@ -328,7 +335,8 @@ void actions(std::ostream& out, const Explanation& e, const std::string& campaig
                          ? "The cause is not known. Until it is, the corrected model predicts better than "
                            "the supplied one:"
                          : "Until the cause is removed, use the corrected model:") +
-                    command("roslaunch smartmill_launch pipeline.launch model:=" + folder + "/model.yaml"));
+                    command("roslaunch smartmill_launch pipeline.launch model:=" + folder + "/model.yaml") +
+                    contentOfModel(e));
   out << "<h2>What to do now</h2>\n<ol>";
   for (const std::string& step : steps) out << "<li>" << step << "</li>";
   out << "</ol>\n";
@@ -497,8 +505,15 @@ std::string worseText(const Explanation& e, const std::string& test) {
 }
 
 void tests(std::ostream& out, const Explanation& e) {
+  const bool remarks = std::any_of(e.gaps.begin(), e.gaps.end(), gotWorse) ||
+                       std::any_of(e.tests.begin(), e.tests.end(), [&](const ReportedTest& t) {
+                         return std::none_of(e.gaps.begin(), e.gaps.end(), [&](const TestGap& g) {
+                           return g.test == t.test.name && g.before > 0.0;
+                         });
+                       });
   out << "<h2>Tests</h2>\n<table><tr><th>test<th>kind<th>speed [rpm]<th>feed per tooth [mm]<th>depth "
-         "[mm]<th>immersion [&deg;]<th>held out<th>supplied model<th>corrected model<th>worse signals</tr>\n";
+         "[mm]<th>immersion [&deg;]<th>held out<th>supplied model<th>corrected model"
+      << (remarks ? "<th>worse signals" : "") << "</tr>\n";
   for (const ReportedTest& t : e.tests) {
     const auto of_test = [&](const TestGap& g) { return g.test == t.test.name; };
     out << "<tr><td>" << escapedHtml(t.test.name) << "<td>" << kindText(t.test) << "<td>"

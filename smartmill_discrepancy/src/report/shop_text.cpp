@@ -21,8 +21,8 @@ std::string largestDifferences(const Explanation& e) {
   constexpr std::size_t MOST = 3;
   std::vector<std::pair<double, std::string>> channels;
   for (const auto& [channel, noise] : e.noise) {
-    const double difference =
-        differenceOf(e.gaps, false, [&c = channel](const TestGap& g) { return g.channel == c; });
+    const double difference = differenceOf(
+        e.gaps, false, [&c = channel](const TestGap& g) { return g.channel == c && !g.heldout; });
     const ChannelWords words = channelWords(channel);
     if (difference > MORE_THAN_NOISE)
       channels.emplace_back(difference, words.title + " " + words.text(difference * noise) +
@@ -32,7 +32,7 @@ std::string largestDifferences(const Explanation& e) {
   std::string text;
   for (std::size_t k = 0; k < std::min(MOST, channels.size()); ++k)
     text += (k ? ", " : " (") + channels[k].second;
-  return text.empty() ? "" : text + "; RMS over the tests)";
+  return text.empty() ? "" : text + "; RMS over the fitted tests)";
 }
 
 std::string causesOf(const Explanation& e) {
