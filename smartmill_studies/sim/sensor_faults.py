@@ -151,6 +151,12 @@ def announcements(text, topic, begin, end):
     return sorted(first.values())
 
 
+def in_steady_cut(condition, position):
+    """Slots are along x."""
+    begin, end = condition.steady_from, condition.steady_to
+    return begin.x < position[0] < end.x and abs(position[1] - begin.y) < 1e-3 and abs(position[2] - begin.z) < 1e-3
+
+
 class Study:
     def __init__(self, folder, bag):
         self.folder, self.bag, self.rows = folder, bag, []
@@ -169,8 +175,8 @@ class Study:
                 if name == "cut/condition":
                     condition = message if message.kind == message.CUT else None
                     continue
-                if name == "cnc/state":  # slots are along x
-                    if condition and condition.steady_from.x < message.position[0] < condition.steady_to.x:
+                if name == "cnc/state":
+                    if condition and in_steady_cut(condition, message.position):
                         cuts.append(stamp)
                         condition = None
                     continue
