@@ -27,8 +27,8 @@ loadmeter::CoefficientRecord recordOf(const std::string& machine, std::size_t nu
 /// was cut off by a kill is left out. @throws Error naming another line.
 std::vector<PushEvent> readPushEvents(const std::string& file);
 
-/// Compares the server's records with the logs of the clients. @return a line for each acknowledged record that
-/// is not there, record that is there twice, that no client has sent, or with another content
+/// Compares the server's records with the logs of the clients. @return a line for each acknowledged record
+/// that is not there, record that is there twice, that no client has sent, or with another content
 std::vector<std::string> violationsOf(const PushHistory& history,
                                       const std::vector<loadmeter::CoefficientRecord>& server);
 
