@@ -120,14 +120,20 @@ MachineModel describeModel(Workbench& bench, const SearchOptions& options, const
   for (const Candidate& r : found.candidates) result->candidates.push_back(r.result);
   MachineModel improved = nameEffects(bench, options, found, result);
   bench.clearWhitening();
-  const auto gapOf = [&](const FitState& state) { return heldoutGap(bench, bench.exact().model(state)); };
+  if (result->effects.empty()) return improved;
+  const TwinRunner& heldout = bench.heldout();
+  const auto residual = [&](const FitState& state) {
+    return residualOf(heldout, bench.exact().model(state));
+  };
+  const std::vector<double> best = residual(found.best.state);
   for (std::size_t m = 0; m < result->effects.size(); ++m) {
     FoundEffect& effect = result->effects[m];
-    effect.heldout_gap_reduction = heldoutReduction(bench, found.best.state, found.without_member[m]);
-    effect.heldout_without = gapOf(found.without_member[m]);
+    const std::vector<double> without = residual(found.without_member[m]);
+    effect.heldout_gap_reduction = reductionOf(best, without);
+    effect.heldout_without = gapOf(heldout, without);
     auto rival = effect.alternatives.begin();
     for (const Alternative& alternative : found.alternatives) {
-      if (alternative.member == m) (rival++)->heldout_gap = gapOf(alternative.state);
+      if (alternative.member == m) (rival++)->heldout_gap = gapOf(heldout, residual(alternative.state));
     }
   }
   return improved;

@@ -16,17 +16,6 @@ double rmsOf(const std::vector<double>& v, std::size_t from, std::size_t size) {
 }
 
 // Gap of all spans except chattering cuts.
-double gapOf(const TwinRunner& runner, const std::vector<double>& residual) {
-  double squares = 0.0;
-  std::size_t samples = 0;
-  for (const ChannelSpan& b : runner.spans()) {
-    if (!b.in_gap) continue;
-    squares += std::pow(rmsOf(residual, b.offset, b.size), 2) * static_cast<double>(b.size);
-    samples += b.size;
-  }
-  return samples ? std::sqrt(squares / static_cast<double>(samples)) : 0.0;
-}
-
 // By chattering cut.
 std::map<std::string, double> predictionErrors(const TwinRunner& runner,
                                                const std::vector<double>& residual) {
@@ -62,15 +51,22 @@ void addGaps(const TwinRunner& runner, const std::vector<double>& before, const 
 
 }  // namespace
 
+double gapOf(const TwinRunner& runner, const std::vector<double>& residual) {
+  double squares = 0.0;
+  std::size_t samples = 0;
+  for (const ChannelSpan& b : runner.spans()) {
+    if (!b.in_gap) continue;
+    squares += std::pow(rmsOf(residual, b.offset, b.size), 2) * static_cast<double>(b.size);
+    samples += b.size;
+  }
+  return samples ? std::sqrt(squares / static_cast<double>(samples)) : 0.0;
+}
+
 ModelResidual residualOf(const Workbench& bench, const MachineModel& model) {
   ModelResidual r{residualOf(bench.fitted(), model), residualOf(bench.heldout(), model), {}, {}};
   r.gap = {gapOf(bench.fitted(), r.fit), gapOf(bench.heldout(), r.heldout)};
   r.chattering = predictionErrors(bench.fitted(), r.fit);
   return r;
-}
-
-double heldoutGap(const Workbench& bench, const MachineModel& model) {
-  return gapOf(bench.heldout(), residualOf(bench.heldout(), model));
 }
 
 void writeOutcome(const Workbench& bench, const ModelResidual& before, const MachineModel& improved,

@@ -51,7 +51,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     if (!missing) {
       for (Hypothesis& form : formsOf(kind, scope)) all.push_back(std::move(form));
     } else if (!missing->empty() && notes) {
-      notes->push_back(kind.name + " is not tested: " + *missing);
+      notes->push_back(kind.name + std::string(NOT_TESTED) + *missing);
     }
   }
   return all;

@@ -15,6 +15,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/hypotheses/hypothesis.h"
 #include "smartmill_discrepancy/report/shop_quantity.h"
 #include "smartmill_discrepancy/report/shop_text.h"
 
@@ -23,8 +24,6 @@ namespace {
 
 /// [1] of the remaining difference: smaller components are not listed.
 constexpr double LEAST_SHARE = 0.01;
-/// In a note on an effect of the catalogue that the records cannot show, between its name and the reason.
-const std::string NOT_TESTED = " is not tested: ";
 /// [1] Difference, times the noise, up to which only noise remains.
 constexpr double ONLY_NOISE = 1.01;
 

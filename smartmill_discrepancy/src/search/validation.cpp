@@ -138,11 +138,11 @@ ValidationResult validate(const Workbench& bench, const FitState& better, const 
           effectScaleOf(fitted)};
 }
 
-double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other) {
-  const TwinRunner& heldout = bench.heldout();
-  const auto excess = [&](const FitState& state) {
-    return residualSquares(heldout, heldout.simulate(bench.exact().model(state))) -
-           static_cast<double>(heldout.size());
+double reductionOf(const std::vector<double>& better, const std::vector<double>& other) {
+  const auto excess = [](const std::vector<double>& residual) {
+    double squares = 0.0;
+    for (const double r : residual) squares += r * r;
+    return squares - static_cast<double>(residual.size());
   };
   const double with = excess(better), without_it = excess(other);
   return without_it > 0.0 ? std::clamp(1.0 - std::max(with, 0.0) / without_it, -1.0, 1.0) : 0.0;

@@ -111,16 +111,14 @@ std::string MeasuredMachine::missing(const ChartParameters& parameters) const {
   const auto need = [&](bool present, const std::string& what) {
     if (!present) list += (list.empty() ? "" : ", ") + what;
   };
+  const bool limits_size = parameters.surface_tolerance > 0.0;
   for (const std::string direction : {"x", "y"}) {
-    if (needsModes(parameters)) {
-      need(modes_.count(direction) > 0, "modes in " + direction);
-    } else if (!byCollocation(parameters)) {
+    if (needsModes(parameters) || limits_size) need(modes_.count(direction) > 0, "modes in " + direction);
+    if (!needsModes(parameters) && !byCollocation(parameters))
       need(frfs_.count(direction) > 0, "FRF in " + direction);
-    }
   }
   need(coefficients_ && coefficients_->value.ktc > 0.0, "tangential coefficient");
-  if (parameters.surface_tolerance > 0.0) {
-    need(modes_.count("x") > 0 && modes_.count("y") > 0, "modes in x and y (surface_tolerance)");
+  if (limits_size) {
     need(coefficients_ && std::isfinite(coefficients_->value.kte + coefficients_->value.kre),
          "edge coefficients (surface_tolerance)");
   }

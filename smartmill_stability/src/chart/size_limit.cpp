@@ -1,10 +1,9 @@
 #include "chart/size_limit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
-
-#include "smartmill_core/signal/statistics.h"
 
 namespace smartmill::stability {
 
@@ -14,21 +13,21 @@ SizeLimit::SizeLimit(const UncertainSystem& system, double tolerance, const Risk
   for (int i = 0; i < spread.draws; ++i) drawn_.emplace_back(system.draw(random));
 }
 
-std::vector<double> SizeLimit::speedsAbout(double speed) const {
-  return {(1.0 - margin_) * speed, speed, (1.0 + margin_) * speed};
+/// @param deviations [1] standard deviations that are added to the error
+bool SizeLimit::within(double speed, double depth, double deviations) const {
+  const std::array<double, 3> speeds{{(1.0 - margin_) * speed, speed, (1.0 + margin_) * speed}};
+  return std::all_of(speeds.begin(), speeds.end(), [&](double s) {
+    const double spread = deviations > 0.0 ? deviations * errorStd(drawn_, s, depth) : 0.0;
+    return std::abs(mean_.at(s, depth).error) + spread <= tolerance_;
+  });
 }
 
 bool SizeLimit::meanHolds(double speed, double depth) const {
-  const std::vector<double> speeds = speedsAbout(speed);
-  return std::all_of(speeds.begin(), speeds.end(),
-                     [&](double s) { return std::abs(mean_.at(s, depth).error) <= tolerance_; });
+  return within(speed, depth, 0.0);
 }
 
 bool SizeLimit::holds(double speed, double depth) const {
-  const std::vector<double> speeds = speedsAbout(speed);
-  return std::all_of(speeds.begin(), speeds.end(), [&](double s) {
-    return std::abs(mean_.at(s, depth).error) + 2.0 * errorStd(drawn_, s, depth) <= tolerance_;
-  });
+  return within(speed, depth, 2.0);
 }
 
 }  // namespace smartmill::stability

@@ -23,7 +23,7 @@ class SizeLimit {
   bool holds(double speed, double depth) const;
 
  private:
-  std::vector<double> speedsAbout(double speed) const;
+  bool within(double speed, double depth, double deviations) const;
 
   WallPrediction mean_;
   std::vector<WallPrediction> drawn_;

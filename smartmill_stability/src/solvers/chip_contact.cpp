@@ -90,9 +90,7 @@ class Contact {
   }
 
   void operator()(double t, double inside, Feedback& feedback) const {
-    feedback.now.setZero();
-    feedback.velocity.setZero();
-    feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
+    feedback.clear(delays_.size());
     const bool damps = system_.hasProcessDamping();
     double at = std::fmod(inside, period_);
     if (at < 0.0) at += period_;

@@ -97,9 +97,7 @@ class Teeth {
   }
 
   void operator()(double t, double inside, Feedback& feedback) const {
-    feedback.now.setZero();
-    feedback.velocity.setZero();
-    feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
+    feedback.clear(delays_.size());
     for (std::size_t k = 0; k < angle_.size(); ++k) {
       const double middle = wrap(angle_[k] + speed_ * inside);
       const double angle = middle + speed_ * (t - inside);
@@ -210,9 +208,7 @@ class ShapedTeeth {
   }
 
   void operator()(double t, double inside, Feedback& feedback) const {
-    feedback.now.setZero();
-    feedback.velocity.setZero();
-    feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
+    feedback.clear(delays_.size());
     for (std::size_t k = 0; k < angle_.size(); ++k) {
       const double middle = wrap(angle_[k] + speed_ * inside);
       const double angle = middle + speed_ * (t - inside);

@@ -17,8 +17,8 @@ struct ModelResidual {
 };
 ModelResidual residualOf(const Workbench& bench, const MachineModel& model);
 
-/// Gap of the held-out tests; 0: there are none.
-double heldoutGap(const Workbench& bench, const MachineModel& model);
+/// Gap of a residual over the noise; 0: there are no tests.
+double gapOf(const TwinRunner& runner, const std::vector<double>& residual);
 
 /// Writes the improved model to FOLDER/model.yaml, reads it back and measures its residual.
 /// @param result receives model, after, gaps and curves

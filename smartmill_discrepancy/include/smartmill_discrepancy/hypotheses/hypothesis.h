@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "smartmill_core/model/effect_form.h"
@@ -10,6 +11,9 @@ namespace smartmill::discrepancy {
 
 /// One form of an effect of the catalogue, e.g. gain_error of fx.
 using Hypothesis = EffectForm;
+
+/// In a note on an effect that a campaign cannot test, between its name and the reason.
+inline constexpr std::string_view NOT_TESTED = " is not tested: ";
 
 /// All hypotheses that a campaign can test; notes receives the others with the reason.
 std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std::string>* notes);

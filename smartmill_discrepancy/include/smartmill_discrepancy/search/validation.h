@@ -66,7 +66,8 @@ EffectScale fittedScale(const Fitter& fitter, const FitResult& better, const Fit
 /// @param better, other states of the same campaign, both simulated exactly
 ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other);
 
-/// [1] Share of the held-out squares above the noise that one model removes from another's.
-double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other);
+/// [1] Share of the squares above the noise that one model removes from another's.
+/// @param better, other residuals of both over the noise
+double reductionOf(const std::vector<double>& better, const std::vector<double>& other);
 
 }  // namespace smartmill::discrepancy

@@ -18,6 +18,12 @@ struct Feedback {
   Eigen::Matrix2d now = Eigen::Matrix2d::Zero();       ///< [N/m]
   Eigen::Matrix2d velocity = Eigen::Matrix2d::Zero();  ///< [N s/m]
   std::vector<Eigen::Matrix2d> delayed;                ///< [N/m] one for each delay
+
+  void clear(std::size_t delays) {
+    now.setZero();
+    velocity.setZero();
+    delayed.assign(delays, Eigen::Matrix2d::Zero());
+  }
 };
 
 /// Linear system of modes with periodic delayed feedback, which is smooth between the breaks.
