@@ -1,6 +1,6 @@
 // rosrun smartmill_studies program_explained: causes hidden in a machine of which nothing is known but the
 // production of one pocket, through the simulated Fanuc control, the bridge and the follower of the program.
-// Tried with case 0 of seed 7; counted with --cases 30 --seed 41.
+// Tried with case 0 of seed 7 and 12 cases of seed 41; counted with --cases 30 --seed 43.
 
 #include <algorithm>
 #include <array>
