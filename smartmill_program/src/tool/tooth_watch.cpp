@@ -28,10 +28,10 @@ constexpr double LEAST_CHIP_SHARE = 0.15;     // [1] of the chip in the force
 constexpr double MOST_TOLERANCE = 0.12;       // [1] of the mean force of the tool
 constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
 constexpr double LEAST_SHARE = 0.3;  // [1] of least_force that the teeth without the lost one must have
-// [1] Rotating force by runout, in mean forces of a tooth, from which on a larger loss is required.
-constexpr double UNEVEN = 0.7, UNEVEN_SLOPE = 0.8;
-constexpr double LEAST_STEP = 4.0;  // [1] change over the drift of the references
-constexpr double DEVIATION = 0.3;   // [1] of the largest, from which on a step belongs to the loss
+constexpr double LEAST_OWN = 0.5, MOST_OWN = 2.0;  // [1] of the mean share: runout, as far as it is known
+constexpr double PHASE_TOLERANCE = 0.6;            // [rad] unknown depth and Fr / Ft
+constexpr double LEAST_STEP = 4.0;                 // [1] change over the drift of the references
+constexpr double DEVIATION = 0.3;  // [1] of the largest, from which on a step belongs to the loss
 
 }  // namespace
 
@@ -171,6 +171,15 @@ std::size_t ToothWatch::firstDeviation(std::size_t references) const {
   return back;
 }
 
+/// @param at [rad] position on the tool
+int ToothWatch::nearestTooth(double at) const {
+  const auto distance = [&](int tooth) { return std::abs(nearAngle(at - tool_.toothAngle(tooth), 0.0)); };
+  int nearest = 0;
+  for (int j = 1; j < tool_.teeth; ++j)
+    if (distance(j) < distance(nearest)) nearest = j;
+  return nearest;
+}
+
 std::optional<ToothLoss> ToothWatch::test() {
   const RevolutionForce& now = revolutions_.back();
   const auto fail = [this] {
@@ -192,24 +201,28 @@ std::optional<ToothLoss> ToothWatch::test() {
       FORCE_TOLERANCE / teeth + FORCE_SCATTER * std::sqrt(before.force_variance) / std::abs(before.force),
       MOST_TOLERANCE);
   const Complex change = now.rotating - before.rotating;
-  // With runout the lost tooth may have had up to twice the mean share.
-  const double share = std::clamp(std::abs(change) / tooth, 1.0, 2.0);
-  if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * share / teeth - tolerance || ratio > 1.0 + tolerance ||
-      std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE)
-    return fail();
   const double chip_share = std::clamp(1.0 - teeth * (1.0 - ratio), 0.0, 1.0);
   const Complex template_of_first = 1.0 - chip_share * std::polar(1.0, units::TWO_PI / teeth);
   const double variance = before.variance * (1.0 + 1.0 / static_cast<double>(before.count)) +
                           std::pow(parameters_.force_change * tooth, 2);
   const double llr = std::norm(change) / (2.0 * variance);
-  const double loss = std::abs(change) / (tooth * std::abs(template_of_first));
-  const double period = now.time - revolutionBefore(STEPS).time;  // [s]
-  const double tests = parameters_.false_alarm_hours * 3600.0 / period * static_cast<double>(STEPS);
+  const double at = phase_ + std::arg(template_of_first) - std::arg(change);
+  const int lost = nearestTooth(at);
+  // By runout a tooth has more or less than the mean share: the first harmonic of the shares is Z.
+  const double harmonic = tool_.teeth == 2 ? 1.0 : 2.0;
+  const double own = std::clamp(
+      1.0 - harmonic / teeth * std::real(before.rotating * std::polar(1.0, tool_.toothAngle(lost) - phase_)) /
+                tooth,
+      LEAST_OWN, MOST_OWN);
+  if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * own / teeth - tolerance || ratio > 1.0 + tolerance ||
+      std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE ||
+      std::abs(nearAngle(at - tool_.toothAngle(lost), 0.0)) > PHASE_TOLERANCE)
+    return fail();
   if (std::abs(change) < LEAST_STEP * before.drift) return fail();  // growing chatter
-  // Runout of the size of the chip leaves single teeth without one as soon as the feed changes.
-  const double least =
-      parameters_.least_loss + UNEVEN_SLOPE * std::max(0.0, std::abs(before.rotating) / tooth - UNEVEN);
-  if (loss < least || llr < std::log(std::max(tests, 1.0))) return fail();
+  const double loss = std::abs(change) / (tooth * own * std::abs(template_of_first));
+  const double revolution = now.time - revolutionBefore(STEPS).time;  // [s]
+  const double tests = parameters_.false_alarm_hours * 3600.0 / revolution;
+  if (loss < parameters_.least_loss || llr < std::log(std::max(tests, 1.0))) return fail();
   if (++run_ < CONFIRM) return {};
 
   ToothLoss found;
@@ -217,17 +230,10 @@ std::optional<ToothLoss> ToothWatch::test() {
   const std::size_t back = firstDeviation(before.count);
   found.lost_at = steps_[steps_.size() - 1 - back].time;
   found.revolutions = static_cast<double>(back) / static_cast<double>(STEPS);
-  const double at = phase_ + std::arg(template_of_first) - std::arg(change);
-  double nearest = units::TWO_PI;
-  for (int j = 0; j < tool_.teeth; ++j) {
-    const double off = std::abs(nearAngle(at - tool_.toothAngle(j), 0.0));
-    if (off < nearest) {
-      nearest = off;
-      found.tooth = j;
-    }
-  }
+  found.tooth = lost;
   found.loss = loss;
-  found.loss_std = std::hypot(ARC_STD / ARC, std::sqrt(variance) / (tooth * std::abs(template_of_first)));
+  found.loss_std =
+      std::hypot(ARC_STD / ARC, std::sqrt(variance) / (tooth * own * std::abs(template_of_first)));
   found.log_likelihood_ratio = llr;
   reset();  // the tool is another one from here on
   return found;

@@ -1,7 +1,7 @@
 // rosrun smartmill_studies program_tooth_loss: a tooth broken off in a drawn cut of drawn machines, and false
-// reports in hours of production without a loss. Developed with seeds 1 to 3, 2028 and, after a first count
-// (47 of 50 losses, false reports in production), 2029; counted with seed 2030:
-//   --cases 50 --seed 2030; --cases 50 --seed 2030 --least-load 0; --cases 200 --seed 2030 --hours 0.5
+// reports in hours of production without a loss. Developed with seeds 1 to 3, 2028 to 2030 (the last two
+// after a count of each) and 3001 to 3003; counted with seed 2031:
+//   --cases 50 --seed 2031; --cases 50 --seed 2031 --least-load 0; --cases 200 --seed 2031 --hours 0.5
 
 #include <cmath>
 #include <cstdio>

@@ -9,9 +9,13 @@
 
 namespace smartmill::discrepancy {
 
-/// Campaign of a recorded or running production: the last segment of each cutting condition.
+/// Campaign of a recorded or running production: of the last segments of all cutting conditions, those that
+/// differ most in speed, feed, depth, arc, direction and time. Explain simulates each of them a thousand
+/// times.
 class SegmentCampaign {
  public:
+  static constexpr std::size_t MOST_CUTS = 12, MOST_AIR = 3;
+
   void add(const RecordSegment& segment);
   /// Writes the campaign, without segments near the stability limit of the model.
   /// @param progress receives one line for each of these @return number of tests @throws Error.

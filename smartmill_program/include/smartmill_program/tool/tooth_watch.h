@@ -11,8 +11,8 @@
 namespace smartmill::program {
 
 struct ToothWatchParameters {
-  double least_force = 15.0;
-  double least_loss = 0.5;
+  double least_force = 10.0;
+  double least_loss = 0.6;
   int reference_revolutions = 6;
   double force_change = 0.06;
   double false_alarm_hours = 1000.0;
@@ -77,9 +77,11 @@ struct RevolutionForce {
 /// noise of standard deviation s in each component, found from these revolutions, exp(-|D|^2 / (2 s^2)) is
 /// the probability of a larger change. A loss is reported when there is for 7/12 of a revolution
 /// - a likelihood ratio according to false_alarm_hours,
-/// - the size of at least least_loss of a tooth,
-/// - a mean force that a lost tooth leaves, compared with that of the references, extrapolated: entries,
-///   exits, feeds and overrides change it otherwise.
+/// - the direction of one of the teeth,
+/// - the size of at least least_loss of this tooth. By runout its share differs from the mean one; the first
+///   harmonic of the shares follows from Z before,
+/// - a mean force that this tooth leaves, compared with that of the references, extrapolated: entries, exits,
+///   feeds and overrides change it otherwise.
 ///
 /// A tool with one tooth has no such test: its loss is the end of the force. Requires 12 samples in a
 /// revolution.
@@ -124,6 +126,7 @@ class ToothWatch {
   std::optional<ToothLoss> test();
   Reference reference() const;
   std::size_t firstDeviation(std::size_t references) const;
+  int nearestTooth(double at) const;
   const RevolutionForce& revolutionBefore(std::size_t steps) const {
     return revolutions_[revolutions_.size() - 1 - steps];
   }
