@@ -21,7 +21,8 @@ void run(const Arguments& arguments) {
   const MachineModel nominal = readMachineModel(campaign.modelPath());
   // The noise is that of the campaign, for any model.
   discrepancy::Dataset data = discrepancy::loadDataset(campaign, nominal);
-  for (const std::string& note : data.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  for (const auto& notes : {data.notes, data.stream_shifts})
+    for (const std::string& note : notes) std::fprintf(stderr, "note: %s\n", note.c_str());
   const MachineModel model = arguments.model.empty() ? nominal : readMachineModel(arguments.model);
   discrepancy::alignPhases(data, model);
   const discrepancy::CampaignGap gap = discrepancy::campaignGap(data, model, arguments.threads);

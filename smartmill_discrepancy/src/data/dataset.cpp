@@ -220,7 +220,7 @@ void markChatter(Dataset& data) {
 
 // The records of a campaign. Where an axis moves and the force columns are recorded later or earlier than the
 // controller's, the tests state it afterwards.
-std::vector<RecordedTest> recordedTests(const Campaign& campaign, std::set<std::string>* notes) {
+std::vector<RecordedTest> recordedTests(const Campaign& campaign, std::vector<std::string>* shifts) {
   constexpr double BEYOND_CHANCE = 3.0;  // standard deviations
   std::vector<RecordedTest> tests;
   for (const CampaignTest& test : campaign.tests) tests.push_back({test, readRecord(campaign, test)});
@@ -230,7 +230,7 @@ std::vector<RecordedTest> recordedTests(const Campaign& campaign, std::set<std::
     if (one.test.stream_offset.empty() && sim::AxisMotion::isRecorded(one.record))
       one.test.stream_offset["force"] = shift->delay;
   }
-  notes->insert(
+  shifts->push_back(
       formatted("forces are recorded %.5f +- %.2g s %s than the controller's columns: with that shift the "
                 "acceleration of axis %c explains %.1f %% of f%c",
                 std::abs(shift->delay), shift->std_dev, shift->delay > 0.0 ? "later" : "earlier", shift->axis,
@@ -356,7 +356,7 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   data.campaign = campaign;
   data.nominal = nominal;
   std::set<std::string> notes;
-  for (RecordedTest& recorded : recordedTests(campaign, &notes)) {
+  for (RecordedTest& recorded : recordedTests(campaign, &data.stream_shifts)) {
     const CampaignTest& test = recorded.test;
     TestData t;
     t.test = test;

@@ -194,6 +194,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const auto begin = std::chrono::steady_clock::now();
   Explanation result;
   result.notes = data.notes;
+  result.stream_shifts = data.stream_shifts;
   result.nominal = data.nominal;
   result.noise = data.noise;
   addTests(data, &result);
@@ -216,7 +217,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   SearchOptions search_options = options.search;
   if (!labels.doubtful.empty())
     search_options.max_effects = std::min<std::size_t>(search_options.max_effects, 2);
-  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.untestable);
   budget.beginStage(ends.search);
   SearchResult found = search(bench, hypotheses, search_options);
   result.not_tried = effectsOf(found.not_tried);

@@ -43,15 +43,15 @@ EffectScope scopeOf(const Dataset& data) {
 
 }  // namespace
 
-std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std::string>* notes) {
+std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<Untestable>* untestable) {
   const EffectScope scope = scopeOf(data);
   std::vector<Hypothesis> all;
   for (const EffectKind& kind : effectCatalogue()) {
     const std::optional<std::string> missing = missingNeed(kind, scope);
     if (!missing) {
       for (Hypothesis& form : formsOf(kind, scope)) all.push_back(std::move(form));
-    } else if (!missing->empty() && notes) {
-      notes->push_back(kind.name + std::string(NOT_TESTED) + *missing);
+    } else if (!missing->empty() && untestable) {
+      untestable->push_back({kind.name, *missing});
     }
   }
   return all;

@@ -566,9 +566,7 @@ void quality(std::ostream& out, const Explanation& e) {
                        : "left out, since they chatter: " + escapedHtml(joined(left_out)) + ". ") +
                   (chatter ? "" : "No test chatters.") + vibrationText(e));
   std::string shifts;
-  for (const std::string& note : e.notes) {
-    if (note.find("are recorded") != std::string::npos) shifts += " " + escapedHtml(note) + ".";
-  }
+  for (const std::string& shift : e.stream_shifts) shifts += " " + escapedHtml(shift) + ".";
   lines.push_back(
       "Signals: no force and no displacement is clipped by the recorder (such records are refused)." +
       (shifts.empty() ? std::string(" No shift in time between force sensor and controller was corrected.")
@@ -764,11 +762,8 @@ void candidates(std::ostream& out, const Explanation& e) {
   }
   std::vector<std::string> unchecked;
   for (const std::string& name : e.not_tried) unchecked.push_back(namedCause(name));
-  for (const std::string& note : e.notes) {
-    if (const std::size_t end = note.find(NOT_TESTED); end != std::string::npos)
-      unchecked.push_back(namedCause(note.substr(0, end)) + ": these tests cannot show it, " +
-                          escapedHtml(note.substr(end + NOT_TESTED.size())));
-  }
+  for (const Untestable& one : e.untestable)
+    unchecked.push_back(namedCause(one.effect) + ": these tests cannot show it, " + escapedHtml(one.reason));
   list(out, "Causes that were not checked", unchecked);
 }
 
@@ -803,9 +798,7 @@ void appendix(std::ostream& out, const Explanation& e) {
   values(out, "Values of the model", e.calibrated);
   chattering(out, e.chattering);
   std::vector<std::string> notes;
-  for (const std::string& note : e.notes) {
-    if (note.find(NOT_TESTED) == std::string::npos) notes.push_back(escapedHtml(note));
-  }
+  for (const std::string& note : e.notes) notes.push_back(escapedHtml(note));
   list(out, "Notes", notes);
   out << "<p class=\"dim\">Verdict in report.json: " << nameOf(e.verdict) << ".</p>\n</details>\n";
 }

@@ -164,7 +164,10 @@ void writeReport(const Explanation& e, const std::string& folder) {
                                     {"simulations", t.simulations},
                                     {"seconds", rounded(t.seconds)}});
   }
-  report["notes"] = e.notes;
+  std::vector<std::string> notes = e.notes;
+  notes.insert(notes.end(), e.stream_shifts.begin(), e.stream_shifts.end());
+  for (const Untestable& one : e.untestable) notes.push_back(one.effect + " is not tested: " + one.reason);
+  report["notes"] = notes;
   if (e.interrupted) report["interrupted"] = true;
   if (e.spent_budget) report["spent_budget_s"] = rounded(*e.spent_budget);
   if (!e.not_tried.empty()) report["not_tried"] = e.not_tried;

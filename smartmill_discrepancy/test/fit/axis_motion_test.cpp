@@ -78,9 +78,8 @@ TEST(AxisMotion, theOffsetIsFoundWhereItIsNotStated) {
   const Dataset data = movesOf(folder, {});
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
   EXPECT_NEAR(massIn(data, inertiaOf(hypotheses, "x")), 37.3, 0.5);
-  EXPECT_TRUE(std::any_of(data.notes.begin(), data.notes.end(), [](const std::string& note) {
-    return note.find("forces are recorded 0.18") != std::string::npos;
-  }));
+  ASSERT_EQ(data.stream_shifts.size(), 1u);
+  EXPECT_NE(data.stream_shifts[0].find("forces are recorded 0.18"), std::string::npos);
 }
 
 // By the stated offset of zero force and acceleration are nearly uncorrelated.

@@ -103,7 +103,8 @@ TEST(ReportHtml, StatesWhetherTheSearchWasComplete) {
   expectContains(pageOf(e), "All 30 causes that these tests can show were checked.");
   e.not_tried = {"helix", "feed_error"};
   e.spent_budget = 60.0;
-  e.notes = {"process_damping is not tested: the model's tool is rigid", "fp is not simulated"};
+  e.untestable = {{"process_damping", "the model's tool is rigid"}};
+  e.notes = {"fp is not simulated"};
   const std::string page = pageOf(e);
   expectContains(page, "28 of 30 causes that these tests can show were checked");
   expectContains(page, "smartmill explain /data/mill&lt;2&gt; -o ");

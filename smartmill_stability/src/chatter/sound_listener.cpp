@@ -85,6 +85,8 @@ void SoundListener::reset(const SampleBlock& block) {
   quiet_.clear();
   loud_ = silent_ = 0;
   cut_.reset();
+  earlier_ = Cut();
+  earlier_->begin_time = block.stamp;
   frames_.reset(rate_);
   maker_.reset();
 }
@@ -123,7 +125,7 @@ void SoundListener::endFrame() {
   const bool loud = quiet_.size() >= LEAST_QUIET && frame.loudness > detection.contrast * quiet();
   if (!cut_) {
     loud_ = loud ? loud_ + 1 : 0;
-    if (!loud) {
+    if (!isAfterEarlierCut(frame, detection.contrast) && !loud) {
       quiet_.push_back(frame.loudness);
       if (quiet_.size() > MOST_QUIET) quiet_.pop_front();
       state_.quiet_level = std::sqrt(share([](const SoundFrame& f) { return f.total; }));
@@ -166,6 +168,7 @@ Recording SoundListener::soundOf(std::uint64_t from, std::uint64_t to) const {
 // Cuts
 
 void SoundListener::begin(std::uint64_t sample) {
+  judgeEarlierCut(sample);
   Cut cut;
   cut.number = ++cuts_;
   cut.begin = cut.judged = sample;
@@ -182,12 +185,14 @@ void SoundListener::begin(std::uint64_t sample) {
   state_.kind = SoundState::Kind::cutting;
 }
 
-/// Ends a part of the running cut, which is then judged. @param end [samples]
-void SoundListener::endPart(std::uint64_t end, bool last) {
+/// Ends a part of the running cut, which is then judged. @param end [samples] @param chatter_only another
+/// verdict does not count
+void SoundListener::endPart(std::uint64_t end, bool last, bool chatter_only) {
   constexpr double LEAST = 0.5;  // [s] worth judging
   Part part;
   part.cut = cut_->number;
   part.last = last;
+  part.chatter_only = chatter_only;
   part.begin = cut_->begin_time;
   part.end = newest_ - static_cast<double>(count_ - end) / rate_;
   part.clipped =
@@ -219,6 +224,39 @@ void SoundListener::endCut(std::uint64_t end) {
   loud_ = 0;
   air_from_ = count_;
   state_.kind = SoundState::Kind::idle;
+}
+
+/// Of a cut that ran when the sound began only the end is heard. @return whether the frame may be after it
+bool SoundListener::isAfterEarlierCut(const SoundFrame& frame, double contrast) {
+  if (!earlier_) return false;
+  if (earlier_->judged > 0) {
+    if (static_cast<double>(count_ - earlier_->judged) >= AIR * rate_) judgeEarlierCut(count_);
+    return false;
+  }
+  earlier_->samples += frame.samples;
+  earlier_->clipped += frame.clipped;
+  const bool fell = quiet_.size() >= LEAST_QUIET && contrast * frame.loudness < quiet();
+  silent_ = fell ? silent_ + 1 : 0;
+  if (silent_ < ONSET) return fell;
+  earlier_->judged = count_ - silent_ * frame.samples;
+  silent_ = 0;
+  quiet_.clear();
+  return false;
+}
+
+/// @param until [samples] end of the air after it
+void SoundListener::judgeEarlierCut(std::uint64_t until) {
+  const std::optional<Cut> cut = std::exchange(earlier_, std::nullopt);
+  if (!cut || cut->judged == 0) return;
+  const std::uint64_t guard = recent_.back().samples, end = cut->judged;
+  cut_ = *cut;
+  cut_->number = ++cuts_;
+  cut_->speed = presentSpeed();
+  cut_->air = soundOf(end + guard, until);
+  cut_->judged = cut_->begin;
+  endPart(end > guard ? end - guard : 0, true, true);
+  air_from_ = end + guard;
+  cut_.reset();
 }
 
 void SoundListener::stop(const std::string& reason) {
@@ -343,6 +381,7 @@ std::optional<SoundListener::Job> SoundListener::nextJob() {
     job.cut = part.cut;
     job.sound = std::move(part.sound);
     job.last = part.last;
+    job.chatter_only = part.chatter_only;
     job.result = result_.value_or(SoundTry());
     job.result.begin = part.begin;
     job.result.end = part.end;
@@ -359,7 +398,7 @@ SoundListener::Outcome SoundListener::Job::run() const {
   try {
     if (sound) {
       const RecordingVerdict verdict = judgeCut(*sound);
-      outcome.result.add(verdict);
+      if (!chatter_only || verdict.kind == Kind::chatter) outcome.result.add(verdict);
       outcome.part_is_cut = verdict.kind != Kind::no_cut;
     }
     std::vector<SoundTry> all = tries;

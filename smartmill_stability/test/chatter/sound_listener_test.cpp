@@ -126,6 +126,44 @@ TEST(SoundListener, aChatteringCutIsJudgedAndASpeedProposed) {
   EXPECT_NEAR(shop.state().advice.speeds[0].stable, search.next().stable, 0.02);
 }
 
+// Listening begins in a cut: only its end is heard.
+TEST(SoundListener, aCutThatRunsWhenListeningBeginsIsJudgedAfterItsEnd) {
+  Workshop shop(parameters());
+  shop.cut(6.0, RPM, {873.0});
+  EXPECT_TRUE(shop.state().tries.empty());
+  shop.idle(1.5);
+  ASSERT_EQ(shop.state().tries.size(), 1u);
+  const SoundTry heard = shop.state().tries[0];
+  EXPECT_EQ(heard.kind, Kind::chatter) << heard.text;
+  EXPECT_NEAR(heard.frequency, 873.0, 1.0);
+  EXPECT_NEAR(heard.begin, Workshop::START, 0.2);
+  EXPECT_NEAR(heard.end, Workshop::START + 6.0, 0.2);
+  ASSERT_FALSE(shop.state().advice.speeds.empty());
+  // The next cut is heard as any other, also one that begins before a second of air is over.
+  shop.cut(2.5, RPM);
+  shop.idle(1.5);
+  ASSERT_EQ(shop.state().tries.size(), 2u);
+  EXPECT_EQ(shop.state().tries[1].kind, Kind::stable) << shop.state().tries[1].text;
+
+  Workshop hasty(parameters());
+  hasty.cut(4.0, RPM, {873.0});
+  hasty.idle(0.8);
+  hasty.cut(2.5, RPM, {873.0});
+  hasty.idle(1.5);
+  ASSERT_EQ(hasty.state().tries.size(), 2u);
+  for (const SoundTry& one : hasty.state().tries) EXPECT_EQ(one.kind, Kind::chatter) << one.text;
+}
+
+// As a stable cut that ends when listening has begun in it.
+TEST(SoundListener, aSpindleThatStopsIsNoCut) {
+  Workshop shop(parameters());
+  std::vector<Tone> spindle;
+  for (int k = 1; k < 40; ++k) spindle.push_back({k * RPM / 60.0, 2.0});
+  shop.play(4.0, spindle, 3.0);
+  shop.play(3.0, {}, 0.2);
+  EXPECT_TRUE(shop.state().tries.empty());
+}
+
 TEST(SoundListener, eachTryImprovesTheAdviceUntilACutIsStable) {
   Workshop shop(parameters());
   shop.idle(2.0);

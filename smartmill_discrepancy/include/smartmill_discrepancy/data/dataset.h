@@ -86,6 +86,7 @@ struct Dataset {
   std::vector<ChatteringTest> chattering;  ///< not among tests
   std::map<std::string, double> noise;     ///< RMS of each channel [unit of the channel]
   std::vector<std::string> notes;          ///< exclusions, one line each
+  std::vector<std::string> stream_shifts;  ///< corrected, one line each
 
   std::size_t samples() const;  ///< sum over tests of channels x samples
 };

@@ -133,6 +133,11 @@ struct GapPair {
   double fit = 0.0, heldout = 0.0;
 };
 
+/// An effect of the catalogue that the tests of a campaign cannot show.
+struct Untestable {
+  std::string effect, reason;
+};
+
 /// Result of explain (formats.md section 3).
 struct Explanation {
   Verdict verdict = Verdict::no_disagreement;
@@ -151,6 +156,8 @@ struct Explanation {
   std::vector<ChannelShare> channels;
   std::vector<CandidateResult> candidates;
   std::vector<std::string> notes;
+  std::vector<std::string> stream_shifts;  ///< corrected, one line each
+  std::vector<Untestable> untestable;
   InspectionCheck inspection;             ///< with --inspection
   std::vector<ChatteringCut> chattering;  ///< used in the fit
   std::vector<RevolutionCurve> revolutions;

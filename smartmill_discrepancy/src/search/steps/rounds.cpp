@@ -47,7 +47,7 @@ bool Rounds::addEffect(SearchState& s) {
   reverted_ = false;
   const std::size_t first = s.result.candidates.size();
   s.result.candidates.insert(s.result.candidates.end(), round.candidates().begin(), round.candidates().end());
-  if (!round.improved() || s.bench.cancelled()) return false;
+  if (!round.improved()) return false;
   const Hypothesis* const newest = round.best().state.members.back().hypothesis;
   RoundStart before{s.now, std::move(s.tangents)};
   adopt(s, std::move(round.best()));

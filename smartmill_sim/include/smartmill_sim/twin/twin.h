@@ -18,9 +18,9 @@ class CutTraces;
 /// Simulated cut before a record of a running cut. Its depth grows at first, since a sudden full cut would
 /// excite a long transient.
 struct LeadIn {
-  double time = 0.4;           ///< [s] in which the transient of the tool decays
+  double time = 0.2;           ///< [s] in which the transients of tool and load meter decay
   double least_steady = 0.1;   ///< [s] a shorter time before the record is simulated as it is
-  double growing_share = 0.6;  ///< [1] of the time, in which the depth grows; then the cut settles
+  double growing_share = 0.3;  ///< [1] of the time, in which the depth grows; then the cut settles
   double first_depth = 0.01;   ///< [1] of the depth: contact from the beginning
   long steps = 32;             ///< between two depths: far more often than a tool vibrates
 };

@@ -68,8 +68,10 @@ struct SoundState {
 /// A cut begins where the band of chatter detection is CutFinderOptions::contrast times as loud as before for
 /// a third of a second, and ends where it no longer is. Each two seconds (48 revolutions) of it are judged; a
 /// part without a sign of teeth ends the cut, and its level is then that of the air: a spindle that starts,
-/// coolant. A cut chatters if one of its parts does. The speed is that of cnc/state, or the stated one;
-/// another speed begins another cut.
+/// coolant. A cut that ran when the sound began is heard by its end: its last part is judged against the air
+/// after it and counts if it chatters, since a spindle that stops sounds like a stable cut that ends. A cut
+/// chatters if one of its parts does. The speed is that of cnc/state, or the stated one; another speed begins
+/// another cut.
 ///
 /// Judging and the search take up to seconds: nextJob() returns the work, whose run() may be called in
 /// another thread; finish() takes its outcome. The sound itself is kept for seconds only.
@@ -99,7 +101,7 @@ class SoundListener {
     std::optional<CutSound> sound;          // empty: nothing more of the cut
     SoundTry result;                        // of the earlier parts
     std::optional<SoundTry> before;         // the same, if there are any
-    bool last = false, recompute = false;
+    bool last = false, recompute = false, chatter_only = false;
     int teeth = 0;
     SpeedRange range;
     std::vector<SoundTry> tries;
@@ -134,7 +136,7 @@ class SoundListener {
   struct Part {
     std::uint64_t cut = 0;
     std::optional<CutSound> sound;
-    bool last = false;
+    bool last = false, chatter_only = false;
     double begin = 0.0, end = 0.0, clipped = 0.0;  // [s], [s], [1] of the cut so far
   };
   void reset(const SampleBlock& block);
@@ -144,8 +146,10 @@ class SoundListener {
   double quiet() const;
   Recording soundOf(std::uint64_t from, std::uint64_t to) const;
   void begin(std::uint64_t sample);
-  void endPart(std::uint64_t end, bool last);
+  void endPart(std::uint64_t end, bool last, bool chatter_only = false);
   void endCut(std::uint64_t end);
+  bool isAfterEarlierCut(const SoundFrame& frame, double contrast);
+  void judgeEarlierCut(std::uint64_t until);
   void dropCut();
   double presentSpeed() const;
   void followSpeed();
@@ -170,6 +174,7 @@ class SoundListener {
   std::deque<SoundFrame> recent_;      // without their power
   std::deque<double> quiet_;           // [unit2] loudness of frames in air
   std::size_t loud_ = 0, silent_ = 0;  // frames in succession
+  std::optional<Cut> earlier_;         // that may run since the sound began; judged: its end, 0: not heard
   double stated_speed_ = 0.0, controller_speed_ = 0.0, controller_stamp_ = 0.0;
 
   std::optional<Cut> cut_;
