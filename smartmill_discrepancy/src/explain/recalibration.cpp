@@ -89,11 +89,19 @@ std::vector<Equivalent> equivalentEffects(Workbench& bench, const std::vector<Hy
   const double required = LIMITS.share_removed * moved.penalty;
   const double as_well = moved.chi2 + options.negligible_excess * bench.samples();
   ScreeningMemory memory;
+  std::vector<PredictedGain> screened =
+      screen(quick, from, tangents, hypotheses, LIMITS.share_predicted * required, &memory);
+  // What an effect removes of the squared deviations, not of the residual: many imitate a part of the noise.
+  const auto removed = [](const PredictedGain& p) {
+    return p.prior_evidence.squares + 2.0 * p.prior_evidence.product;
+  };
+  std::stable_sort(screened.begin(), screened.end(),
+                   [&](const PredictedGain& a, const PredictedGain& b) { return removed(a) > removed(b); });
   std::vector<Equivalent> equivalents;
   std::size_t fits = 0;
-  for (const PredictedGain& predicted :
-       screen(quick, from, tangents, hypotheses, LIMITS.share_predicted * required, &memory)) {
-    if (predicted.gain < LIMITS.share_predicted * required || fits >= LIMITS.max_fits || bench.cancelled())
+  for (const PredictedGain& predicted : screened) {
+    if (removed(predicted) < LIMITS.share_predicted * required || fits >= LIMITS.max_fits ||
+        bench.cancelled())
       break;
     if (predicted.start.empty()) continue;
     ++fits;

@@ -109,18 +109,23 @@ Projection::Reduction Projection::reduction(const Eigen::MatrixXd& information, 
   return result;
 }
 
-Projection::Change Projection::changeBy(const SparseColumns& columns, const Reduction& reduction) const {
+std::shared_ptr<const Eigen::VectorXd> Projection::changeBy(const SparseColumns& columns,
+                                                            const Reduction& reduction) const {
   auto simulated = std::make_shared<Eigen::VectorXd>(Eigen::VectorXd::Zero(residual_.size()));
   columns.addTo(reduction.amplitudes, simulated.get());
   move(reduction.all_else - baseline_.by, simulated.get());
-  Change change{std::move(simulated), {}};
+  return simulated;
+}
+
+ScaleEvidence Projection::priorEvidence(const Reduction& reduction) const {
+  ScaleEvidence evidence;
   for (std::size_t c = 0; c < freedom_.size(); ++c) {
     const double by = reduction.all_else[static_cast<Index>(c)];
     const double d = (by - baseline_.by[static_cast<Index>(c)]) / freedom_[c].prior_std;
-    change.prior_evidence.squares += d * d;
-    change.prior_evidence.product -= d * (nominal_[c] + by - freedom_[c].null) / freedom_[c].prior_std;
+    evidence.squares += d * d;
+    evidence.product -= d * (nominal_[c] + by - freedom_[c].null) / freedom_[c].prior_std;
   }
-  return change;
+  return evidence;
 }
 
 double Projection::roughGain(const Eigen::MatrixXd& columns) const {

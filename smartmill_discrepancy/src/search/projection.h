@@ -31,13 +31,11 @@ class Projection {
   };
   Reduction reduction(const SparseColumns& columns) const;
 
-  /// Change of the simulation with the columns relative to that without them, and what the priors of the
-  /// nominal values gain.
-  struct Change {
-    std::shared_ptr<const Eigen::VectorXd> simulated;
-    ScaleEvidence prior_evidence;  ///< without variance
-  };
-  Change changeBy(const SparseColumns& columns, const Reduction& reduction) const;
+  /// Change of the simulation with the columns relative to that without them.
+  std::shared_ptr<const Eigen::VectorXd> changeBy(const SparseColumns& columns,
+                                                  const Reduction& reduction) const;
+  /// The same of the stated nominal values over their deviations, without variance.
+  ScaleEvidence priorEvidence(const Reduction& reduction) const;
   /// Residual without the columns.
   std::shared_ptr<const Eigen::VectorXd> baselineResidual() const { return baseline_residual_; }
 

@@ -65,11 +65,9 @@ PredictedGain predictGain(const Fitter& fitter, const FitResult& now, const Proj
     if (start == probe.null) continue;  // the optimum is outside the bounds
     best.gain = reduction.gain;
     best.start = std::move(start);
-    best.prior_evidence = {};
+    best.prior_evidence = projection.priorEvidence(reduction);
     if (best.gain > ValidationResult::requiredSquares()) {
-      const Projection::Change by = projection.changeBy(change, reduction);
-      best.change = by.simulated;
-      best.prior_evidence = by.prior_evidence;
+      best.change = projection.changeBy(change, reduction);
       best.baseline_residual = projection.baselineResidual();
     }
     best.null = probe.from_points ? std::vector<double>{} : probe.null;
