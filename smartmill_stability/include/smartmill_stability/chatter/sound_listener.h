@@ -90,13 +90,10 @@ class SoundListener {
 
   struct Outcome;
   /// Part of a cut to be judged, with what is known so far.
-  class Job {
-   public:
+  struct Job {
     /// Does not refer to the listener.
     Outcome run() const;
 
-   private:
-    friend class SoundListener;
     std::uint64_t cut = 0, generation = 0;  // cut 0: the search only
     std::optional<CutSound> sound;          // empty: nothing more of the cut
     SoundTry result;                        // of the earlier parts
