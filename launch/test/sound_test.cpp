@@ -134,6 +134,8 @@ TEST(Sound, aMicrophoneAloneGivesTheNextSpeedAndNoSoundIsStored) {
     if (!advised()) until([&] { return last.state == SoundAdvice::IDLE && !last.running; });
   }
   ASSERT_TRUE(advised()) << last.text << testing::contentOf(log);
+  for (const smartmill_msgs::SoundTry& one : last.tries)
+    EXPECT_NE(one.kind, smartmill_msgs::SoundTry::STABLE) << one.text;
   EXPECT_NEAR(chattering()->frequency, CHATTER, 1.0);
   EXPECT_NEAR(chattering()->spindle_speed, units::TWO_PI * REVOLUTION, 0.01 * units::TWO_PI * REVOLUTION);
   EXPECT_GT(last.next_stable.at(0), 0.1);

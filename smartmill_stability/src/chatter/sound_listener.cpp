@@ -139,7 +139,7 @@ void SoundListener::endFrame() {
   if (silent_ >= ONSET) {
     endCut(count_ - silent_ * frame.samples);
   } else if (static_cast<double>(count_ - cut_->judged) >= partLength(cut_->speed)) {
-    endPart(count_, false);
+    endPart(*cut_, count_, false);
   }
 }
 
@@ -185,32 +185,32 @@ void SoundListener::begin(std::uint64_t sample) {
   state_.kind = SoundState::Kind::cutting;
 }
 
-/// Ends a part of the running cut, which is then judged. @param end [samples] @param chatter_only another
+/// Ends a part of a cut, which is then judged. @param end [samples] @param chatter_only another
 /// verdict does not count
-void SoundListener::endPart(std::uint64_t end, bool last, bool chatter_only) {
+void SoundListener::endPart(Cut& cut, std::uint64_t end, bool last, bool chatter_only) {
   constexpr double LEAST = 0.5;  // [s] worth judging
   Part part;
-  part.cut = cut_->number;
+  part.cut = cut.number;
   part.last = last;
   part.chatter_only = chatter_only;
-  part.begin = cut_->begin_time;
+  part.begin = cut.begin_time;
   part.end = newest_ - static_cast<double>(count_ - end) / rate_;
   part.clipped =
-      static_cast<double>(cut_->clipped) / static_cast<double>(std::max<std::size_t>(1, cut_->samples));
-  const auto length = static_cast<std::uint64_t>(partLength(cut_->speed));
-  if (static_cast<double>(end - std::min(end, cut_->judged)) >= LEAST * rate_) {
-    const std::uint64_t from = std::max(cut_->begin, end > length ? end - length : 0);
+      static_cast<double>(cut.clipped) / static_cast<double>(std::max<std::size_t>(1, cut.samples));
+  const auto length = static_cast<std::uint64_t>(partLength(cut.speed));
+  if (static_cast<double>(end - std::min(end, cut.judged)) >= LEAST * rate_) {
+    const std::uint64_t from = std::max(cut.begin, end > length ? end - length : 0);
     CutSound sound;
     sound.cut = soundOf(from, end);
-    sound.cut.start = static_cast<double>(from - cut_->begin) / rate_;
-    sound.air = cut_->air;
+    sound.cut.start = static_cast<double>(from - cut.begin) / rate_;
+    sound.air = cut.air;
     sound.teeth = state_.teeth;
-    sound.speed = cut_->speed;
+    sound.speed = cut.speed;
     part.sound = std::move(sound);
-  } else if (cut_->judged == cut_->begin) {
+  } else if (cut.judged == cut.begin) {
     return;  // a bang
   }
-  cut_->judged = end;
+  cut.judged = end;
   if (state_.teeth == 0) {
     if (last) note("a cut was heard; it is judged when the number of teeth is set");
     return;
@@ -219,7 +219,7 @@ void SoundListener::endPart(std::uint64_t end, bool last, bool chatter_only) {
 }
 
 void SoundListener::endCut(std::uint64_t end) {
-  endPart(end, true);
+  endPart(*cut_, end, true);
   cut_.reset();
   loud_ = 0;
   air_from_ = count_;
@@ -246,17 +246,14 @@ bool SoundListener::isAfterEarlierCut(const SoundFrame& frame, double contrast) 
 
 /// @param until [samples] end of the air after it
 void SoundListener::judgeEarlierCut(std::uint64_t until) {
-  const std::optional<Cut> cut = std::exchange(earlier_, std::nullopt);
+  std::optional<Cut> cut = std::exchange(earlier_, std::nullopt);
   if (!cut || cut->judged == 0) return;
-  const std::uint64_t guard = recent_.back().samples, end = cut->judged;
-  cut_ = *cut;
-  cut_->number = ++cuts_;
-  cut_->speed = presentSpeed();
-  cut_->air = soundOf(end + guard, until);
-  cut_->judged = cut_->begin;
-  endPart(end > guard ? end - guard : 0, true, true);
+  const std::uint64_t guard = recent_.back().samples, end = std::exchange(cut->judged, cut->begin);
+  cut->number = ++cuts_;
+  cut->speed = presentSpeed();
+  cut->air = soundOf(end + guard, until);
+  endPart(*cut, end > guard ? end - guard : 0, true, true);
   air_from_ = end + guard;
-  cut_.reset();
 }
 
 void SoundListener::stop(const std::string& reason) {

@@ -143,7 +143,7 @@ class SoundListener {
   double quiet() const;
   Recording soundOf(std::uint64_t from, std::uint64_t to) const;
   void begin(std::uint64_t sample);
-  void endPart(std::uint64_t end, bool last, bool chatter_only = false);
+  void endPart(Cut& cut, std::uint64_t end, bool last, bool chatter_only = false);
   void endCut(std::uint64_t end);
   bool isAfterEarlierCut(const SoundFrame& frame, double contrast);
   void judgeEarlierCut(std::uint64_t until);
