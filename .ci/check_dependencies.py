@@ -16,6 +16,7 @@ HEADERS = {
     "pybind11": "pybind11-dev",
     "libpq-fe.h": None,  # optional: ./setup --with-fleet
     "mqtt": None, "open62541": None,  # optional: a build without it refuses mqtt_broker, opcua_port
+    "openvdb": None,  # optional: a baseline of program_stock_benchmark, apt install libopenvdb-dev
     "pulse": None, "libsigrok": None, "iio.h": None, "comedilib.h": None,  # optional: ./setup --with-instruments
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }

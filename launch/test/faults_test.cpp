@@ -77,7 +77,7 @@ TEST(Faults, AreAnnouncedUnderTheirTopic) {
     service.request.fault = "";
     ASSERT_TRUE(ros::service::call(names::absolute(names::SET_FAULT), service));
     const double resumed = newest;
-    EXPECT_TRUE(eventually([&] { return newest > resumed + 2.0; }, ros::spinOnce));
+    EXPECT_TRUE(eventually([&] { return newest > resumed + 2.0 * PROMPT; }, ros::spinOnce));
   }
 }
 

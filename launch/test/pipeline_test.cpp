@@ -21,20 +21,13 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/parameters/parameter_reader.h"
 #include "smartmill_ros/follower.h"
+#include "waiting.h"
 
 namespace {
 
 constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
-bool waitFor(const std::function<bool()>& condition, double seconds) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
-  while (!condition()) {
-    if (ros::WallTime::now() > end || !ros::ok()) return false;
-    ros::spinOnce();
-    ros::WallDuration(0.02).sleep();
-  }
-  return true;
-}
+using smartmill::testing::waitFor;
 
 TEST(Pipeline, EveryNodeAcceptsItsParametersAndRuns) {
   std::vector<std::string> nodes;

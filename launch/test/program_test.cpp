@@ -34,6 +34,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
+#include "waiting.h"
 
 namespace smartmill {
 namespace {
@@ -42,13 +43,7 @@ constexpr double TIMEOUT = 240.0;  // [s] time limit on a busy computer
 using Condition = smartmill_msgs::CuttingCondition;
 
 bool wait(const std::function<bool()>& condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
-  while (!condition()) {
-    if (ros::WallTime::now() > end || !ros::ok()) return false;
-    ros::spinOnce();
-    ros::WallDuration(0.02).sleep();
-  }
-  return true;
+  return testing::waitFor(condition, TIMEOUT);
 }
 
 template <class Action, class Result, class Goal>

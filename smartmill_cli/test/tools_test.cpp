@@ -120,14 +120,14 @@ TEST(Tools, DoWhatTheirCommandsDoToAModel) {
                       "--surface-error walls.csv --feed-mm 0.05 --tolerance-um 10");
   expectSame("tool-frf", "nowhere.yaml --tool em12 -o tip", 1);
   const TemporaryFolder folder;
-  std::ofstream(folder.file("cuts.csv")) << "rpm,depth_mm,verdict\n3000,0.1,stable\n3000,0.3,chatter\n"
-                                            "900,0.15,stable\n900,0.3,chatter\n";
+  const std::string two = "rpm,depth_mm,verdict\n3000,0.1,stable\n3000,0.3,chatter\n";
   const std::string probing =
       "--teeth 4 --diameter-mm 12 --entry-deg 0 --exit-deg 180 --speeds 600:4000 --max-depth-mm 1 --cuts " +
-      folder.file("cuts.csv");
+      folder.write("two_cuts.csv", two);
   expectSame("lobes-from-cuts", probing + " -o chart.csv");
   expectSame("lobes-from-cuts", probing + " --risk 0", 1);
-  expectSame("process-damping", cut + "--cuts " + folder.file("cuts.csv") + " -o damped.yaml");
+  const std::string four = folder.write("four_cuts.csv", two + "900,0.15,stable\n900,0.3,chatter\n");
+  expectSame("process-damping", cut + "--cuts " + four + " -o damped.yaml");
 }
 
 TEST(Tools, DoWhatTheirCommandsDoToANcProgram) {
@@ -141,18 +141,20 @@ TEST(Tools, DoWhatTheirCommandsDoToANcProgram) {
 
 TEST(Tools, DoWhatTheirCommandsDoToADatabase) {
   SMARTMILL_SHARED_DATA(campaign, "campaigns/none");
-  for (const char* query :
-       {"list", "find --tool mill --material steel", "export all.csv", "health",
-        "answer --tool mill --material brass", "predict --material steel --rake 5 --helix 30"}) {
-    const std::string fill = campaign + " --source force --database d.sqlite --tool mill --material steel";
-    const Outcome old =
-        shell(toolOf("coefficients") + " " + fill + "\n" + toolOf("database") + " d.sqlite " + query);
-    const Outcome now =
-        shell(SMARTMILL " coefficients " + fill + "\n" SMARTMILL " database d.sqlite " + query);
-    EXPECT_EQ(now.code, old.code) << query;
-    EXPECT_EQ(now.out, old.out) << query;
-    EXPECT_TRUE(now.files == old.files) << query;
-  }
+  const auto filledAndAsked = [&](const std::string& coefficients, const std::string& database) {
+    std::string lines =
+        coefficients + " " + campaign + " --source force --database d.sqlite --tool mill --material steel\n";
+    for (const char* query :
+         {"list", "find --tool mill --material steel", "export all.csv", "health",
+          "answer --tool mill --material brass", "predict --material steel --rake 5 --helix 30"}) {
+      lines += database + " d.sqlite " + query + "\necho '" + query + "': exit code $?\n";
+    }
+    return shell(lines);
+  };
+  const Outcome old = filledAndAsked(toolOf("coefficients"), toolOf("database")),
+                now = filledAndAsked(SMARTMILL " coefficients", SMARTMILL " database");
+  EXPECT_EQ(now.out, old.out);
+  EXPECT_TRUE(now.files == old.files);
 }
 
 TEST(Tools, DoWhatTheirCommandsDoWithASpindleSensor) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <map>
 #include <string>
 #include <thread>
@@ -27,6 +28,35 @@ void show(const MachineStatus& s) {
                        : "",
               1e3 * s.position[0], 1e3 * s.position[1], 1e3 * s.position[2], 6e4 * s.velocity,
               s.errors.empty() ? "" : ", ", s.errors.c_str());
+}
+
+/// A program of a file without its frame: the gateway runs it as a subroutine, which ends itself.
+std::string programOf(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) throw Error(file + ": cannot be read");
+  std::string text;
+  for (std::string line; std::getline(in, line);) {
+    const bool ends = line.find("M30") != std::string::npos || line.find("M2") == 0;
+    if (!line.empty() && line[0] != '%' && !ends) text += line + "\n";
+  }
+  return text;
+}
+
+/// Runs a program to its end. The gateway stops the machine when its client disconnects before.
+void runProgramOf(GatewayClient& client, const std::string& file) {
+  constexpr std::chrono::milliseconds PERIOD(100);
+  client.connect();
+  const std::string program = programOf(file);
+  const int number = client.status().running + 1;
+  for (const Command& command :
+       {Command{CommandCode::open, 0, 0.0, {}}, Command{CommandCode::run, number, 0.0, program}}) {
+    const Reply reply = client.carryOut(command);
+    if (reply.code != Reply::Code::done) throw Error(reply.text);
+  }
+  MachineStatus status = client.status();
+  for (; status.alive && status.errors.empty() && status.done != number; status = client.status())
+    std::this_thread::sleep_for(PERIOD);
+  if (!status.errors.empty()) throw Error(file + ": " + status.errors);
 }
 
 /// Executes a command (null: reads the status). Retries failures until the timeout, since the controller may
@@ -60,17 +90,18 @@ int main(int argc, char** argv) {
                                                  {"hold", CommandCode::hold},
                                                  {"resume", CommandCode::resume},
                                                  {"abort", CommandCode::abort}};
-  std::string folder, command;
+  std::string folder, command, program;
   double timeout = 0.0;
   const double reply_timeout = 8.0;  // [s] of the gateway, including homing
   CommandLine line{"The operator's panel of a LinuxCNC with linuxcnc_gateway."};
   line.option("folder", folder, "folder of the machine").required();
-  line.option(
-          "command", command,
-          "ready: resets emergency stop and errors, switches on, homes; estop; hold; resume; abort; show: "
-          "prints the status")
+  line.option("command", command,
+              "ready: resets emergency stop and errors, switches on, homes; estop; hold; resume; abort; run: "
+              "runs the program of --program and waits for its end (an interrupt stops the machine); show: "
+              "prints the status")
       .required()
-      .oneOf({"ready", "estop", "hold", "resume", "abort", "show"});
+      .oneOf({"ready", "estop", "hold", "resume", "abort", "run", "show"});
+  line.option("--program", program, "NC program in the dialect of LinuxCNC, for run").existingFile();
   line.option("--wait", timeout, "[s] timeout for the controller to start").notNegative().showDefault();
   std::vector<std::string> own_arguments;  // without those of roslaunch
   ros::removeROSArgs(argc, argv, own_arguments);
@@ -80,6 +111,9 @@ int main(int argc, char** argv) {
   }
   return runProgram(line, static_cast<int>(arguments.size()), arguments.data(), [&] {
     GatewayClient client(folder, reply_timeout);
+    if ((command == "run") == program.empty())
+      throw UsageError("--program: expected with run, and only then");
+    if (command == "run") runProgramOf(client, program);
     const auto code = codes.find(command);
     show(carryOut(client, code == codes.end() ? nullptr : &code->second, timeout));
   });

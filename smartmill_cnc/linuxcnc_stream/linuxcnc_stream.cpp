@@ -150,6 +150,7 @@ class Component {
     sample_.distance_to_go = d[6].f * units::MM;
     sample_.spindle_load = d[7].f;
     sample_.marker = d[8].f;
+    sample_.tool = d[9].s;
     return sample_pending_ = true;
   }
 

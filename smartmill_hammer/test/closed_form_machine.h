@@ -149,29 +149,33 @@ class ClosedFormMachine {
     samples.units = {"N", "V"};
     const int dir = at("x") ? 0 : at("y") ? 1 : -1;
     std::normal_distribution<double> normal;
+    double middle = 0.0, retreat = 0.0;  // [m] parts of the gap; the tool moves between the blocks
+    if (dir >= 0) {
+      const Axes3& place = h.position.at(dir == 0 ? "x" : "y");
+      const double height = place[2] - position[2];
+      if (filter_direction != dir || (path.empty() && std::abs(filter_height - height) > 1e-7)) {
+        filter_direction = dir;
+        filter_height = height;
+        filter.clear();
+        filter.emplace_back(crossModel(dir, height), rate * SUB, Hold::first_order);
+        filter[0].reset();
+      }
+      const auto d = static_cast<std::size_t>(dir);
+      const double facing = (dir == 0 ? 0.5 * units::PI : 0.0) - station_turn;
+      middle =
+          alongStation(place)[d] + 2.0 * h.gap_at_zero_volt - alongStation(position)[d] - hidden_offset[d];
+      retreat = profile.retreat(spindle + mounting, model.tool->lag() * height, facing);
+    }
     for (std::size_t i = 0; i < n; ++i) {
       const double t = time + static_cast<double>(i) / rate;
-      double force = 0.0, away = 0.0;
-      if (dir >= 0) {
-        const double height = h.position.at(dir == 0 ? "x" : "y")[2] - position[2];
-        if (filter_direction != dir || (path.empty() && std::abs(filter_height - height) > 1e-7)) {
-          filter_direction = dir;
-          filter_height = height;
-          filter.clear();
-          filter.emplace_back(crossModel(dir, height), rate * SUB, Hold::first_order);
-          filter[0].reset();
-        }
+      double away = 0.0;
+      if (dir >= 0 && hit_at > 0.0) {
         for (int s = SUB - 1; s >= 0; --s) away = filter[0].step(forceAt(t - s / (rate * SUB)));
       }
-      force = forceAt(t);
+      const double force = forceAt(t);
       double volt = -h.range_volt;
       if (dir >= 0) {
-        const auto d = static_cast<std::size_t>(dir);
-        const Axes3 p = alongStation(h.position.at(dir == 0 ? "x" : "y"));
-        const double facing = (dir == 0 ? 0.5 * units::PI : 0.0) - station_turn;
-        const double gap =
-            p[d] + 2.0 * h.gap_at_zero_volt - alongStation(position)[d] - hidden_offset[d] + away +
-            profile.retreat(spindle + mounting, model.tool->lag() * (p[2] - position[2]), facing);
+        const double gap = middle + away + retreat;
         closest = std::min(closest, gap);
         volt = gap > 0.0 ? h.gain_volt * (h.gap_at_zero_volt / gap - 1.0) : h.range_volt;
       }

@@ -130,20 +130,21 @@ class Session {
   std::vector<double> torqueOverARevolution(const Engagement& e) const {
     constexpr int ANGLES = 720, SLICES = 8, PASSES = 8;
     std::vector<double> torque(ANGLES, 0.0);
-    const auto radius = [&](int tooth) {
-      return runout * std::cos(runout_angle - TOOL.toothAngle(tooth % TOOL.teeth));
-    };
+    std::vector<double> radii;
+    for (int tooth = 0; tooth < TOOL.teeth; ++tooth)
+      radii.push_back(runout * std::cos(runout_angle - TOOL.toothAngle(tooth)));
     const double dz = e.axial_depth / SLICES, c = e.feed_per_tooth;
     for (int i = 0; i < ANGLES * SLICES * TOOL.teeth; ++i) {
       const int angle = i % ANGLES, slice = i / ANGLES % SLICES, tooth = i / ANGLES / SLICES;
       double phi = units::TWO_PI * angle / ANGLES + TOOL.toothAngle(tooth) - TOOL.lag() * (slice + 0.5) * dz;
       phi -= units::TWO_PI * std::floor(phi / units::TWO_PI);
       if (phi > units::PI) continue;
+      const double along = c * std::sin(phi), curved = std::pow(c * std::cos(phi), 2) / TOOL.diameter;
       double h = 1.0;
       for (int n = 1; n <= PASSES; ++n) {
-        h = std::min(h, n * c * std::sin(phi) +
-                            (n * n - 1) * c * c * std::pow(std::cos(phi), 2) / TOOL.diameter + radius(tooth) -
-                            radius(tooth + n));
+        const auto at = static_cast<std::size_t>((tooth + n) % TOOL.teeth);
+        h = std::min(h,
+                     n * along + (n * n - 1) * curved + radii[static_cast<std::size_t>(tooth)] - radii[at]);
       }
       if (h > 0.0)
         torque[static_cast<std::size_t>(angle)] += (cutting.ktc * h + cutting.kte) * dz * TOOL.radius();

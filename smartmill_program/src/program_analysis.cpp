@@ -34,11 +34,11 @@ AnalysisResult ProgramAnalysis::run(const std::vector<Move>& moves, const Visit&
   AnalysisResult result;
   StepPredictor predictor(models_, options_.stability);
   CutSimulation simulation(
-      stock_, [&](int tool) { return models_.radius(tool); }, options_.simulation);
+      stock_, [&](int tool) -> const ToolShape& { return models_.shape(tool); }, options_.simulation);
   std::size_t done = 0;
   const auto onStep = [&](const Step& step) {
     const StepPrediction prediction = options_.prediction ? predictor.predict(step) : StepPrediction();
-    result.blocks.back().add(step, prediction, models_.radius(step.move->tool));
+    result.blocks.back().add(step, prediction);
     result.volume += step.volume();
     if (visit) visit(step, prediction);
     const bool stops = ++result.steps % STEPS_PER_CALL == 0 && progress &&

@@ -36,6 +36,19 @@ TEST(AxesTrack, InterpolatesLinearlyBetweenSamples) {
   EXPECT_NEAR(*track.newest(), 10.010, 1e-12);
 }
 
+TEST(AxesTrack, TakesTheToolWhereItIsStated) {
+  AxesTrack track;
+  track.push(block(10.0, 2));
+  SampleBlock with_tool;
+  with_tool.stamp = 10.002;
+  with_tool.sample_rate = 1000.0;
+  with_tool.channels = {"x", "y", "z", "revolutions", "tool"};
+  with_tool.samples = {0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 2.0};
+  track.push(with_tool);
+  EXPECT_EQ(track.at(10.0005).tool, 0);
+  EXPECT_EQ(track.at(10.0025).tool, 2);
+}
+
 TEST(AxesTrack, SamplesThatAreNotNewerAreIgnored) {
   AxesTrack track;
   track.push(block(10.0, 11));

@@ -312,9 +312,29 @@ TEST(Panel, OvertravelIsRefusedBeforeAnythingMoves) {
   EXPECT_EQ(m.calls.state.alarmMessages()[0].number, 501);
 }
 
+// The spindle stops first: 500 rad/s2 from 1000 rpm, then the time of the change.
+TEST(ToolChange, TakesTheToolOfTAtM6) {
+  ControllerOptions options = testOptions();
+  options.magazine = {3, 12};
+  options.tool_change_time = 1.5;
+  Machine m(options);
+  m.start("T12\nS1000 M3\nG4 P500\nT3\n#100=1\nM6\n#100=2\n");
+  m.run(0.51);
+  EXPECT_EQ(m.controller.motion().tool, 0);
+  EXPECT_EQ(m.macro(100), 1.0);
+  const double stop = 1000.0 * RPM / options.spindle_acceleration;
+  m.run(stop + 1.4);
+  EXPECT_EQ(m.controller.motion().tool, 0);
+  EXPECT_EQ(m.controller.motion().spindle_speed, 0.0);
+  EXPECT_EQ(m.macro(100), 1.0);
+  m.run(0.2);
+  EXPECT_EQ(m.controller.motion().tool, 3);
+  EXPECT_EQ(m.macro(100), 2.0);
+}
+
 TEST(Panel, UnknownWordsRaiseAProgramAlarmWithTheBlock) {
   for (const std::string block :
-       {"G18", "G1 X1 Q2 F10", "M8",    "X",    "X1.2.3", "G0 G1 X1",      "X1 X2",     "S#99",
+       {"G18", "G1 X1 Q2 F10", "M10",   "X",    "X1.2.3", "G0 G1 X1",      "X1 X2",     "S#99",
         "P5",  "G4 X1 P2",     "G4",    "F-5",  "#100=",  "#100",          "#100=#200", "#99=1",
         "O-1", "G1 X1",        "(open", "X1e3", "M119",   "X1234567890123"}) {
     Machine m;

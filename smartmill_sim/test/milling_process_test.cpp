@@ -15,7 +15,9 @@
 #include "smartmill_core/testing/disc_mill.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/effects/effect_set.h"
+#include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/cutting_machine.h"
+#include "smartmill_sim/twin/tool_contact.h"
 
 namespace smartmill::sim {
 namespace {
@@ -76,6 +78,52 @@ TEST(MillingProcess, rigidSteadyCutMatchesTheClosedForm) {
   EXPECT_LT(largestError(endMill(2, 0.0), {0.4, 2.2, 3e-3, 1e-4}, 6000.0, 1001), 2e-6);
   EXPECT_LT(largestError(endMill(4, 45.0), {0.0, PI, 70e-3, 5e-5}, 6000.0, 1001),
             2e-6);  // lags by more than a revolution
+}
+
+// A ball end in the solid on a ramp: an axial feed advances the inclined edge too.
+TEST(Cutter, anAxialFeedIsCutByAnInclinedEdge) {
+  constexpr int STEPS = 1440;
+  constexpr double SPEED = 471.0, FEED = 6e-5, DT = TWO_PI / SPEED / STEPS;
+  ToolGeometry ball = endMill(2, 30.0);
+  ball.edge.corner_radius = ball.radius();
+  const double depth = edgeSlices(ball, 0.0)[4].high;         // whole slices
+  for (const double slope : {-0.3, -0.05, 0.0, 0.05, 0.3}) {  // up to down
+    Cutter cutter(ball, aluminium(), DT, {}, 0.0, Cutter::Method::history);
+    const auto at = [&](int step) {
+      ToolMotion motion = motionAt(step * DT, SPEED, FEED * ball.teeth * SPEED / TWO_PI);
+      motion.sink = slope * motion.velocity[0];
+      return motion;
+    };
+    Engagement cut{0.0, PI, depth, FEED};
+    cut.axial_feed_per_tooth = slope * FEED;
+    const MechanisticForce closed(ball, ALUMINIUM, cut);
+    cutter.engage({{0.0, PI, depth}}, at(0));
+    CuttingForce mean;
+    for (int i = 0; i < 2 * STEPS; ++i) {
+      const CuttingForce f = cutter.step(at(i));
+      cutter.endStep({{0.0, 0.0}});
+      if (i >= STEPS) mean.add(f, 1.0 / STEPS);
+    }
+    const CuttingForce expected = closed.mean();
+    EXPECT_NEAR(mean.fx, expected.fx, 2e-3 * std::abs(expected.fy)) << slope;
+    EXPECT_NEAR(mean.fy, expected.fy, 2e-3 * std::abs(expected.fy)) << slope;
+    EXPECT_NEAR(mean.fz, expected.fz, 2e-3 * std::abs(expected.fy)) << slope;
+    EXPECT_NEAR(mean.torque, expected.torque, 2e-3 * expected.torque) << slope;
+  }
+}
+
+// A depth error lengthens what ends in the work's surface; a band with another one on it keeps its end.
+TEST(ToolContact, aDepthErrorLengthensTheUpperBands) {
+  ToolContact contact;
+  contact.engage({{0.0, 2.0, 1e-3, 0.0}, {2.5, 3.0, 0.8e-3, 0.0}, {0.0, 1.5, 2e-3, 1e-3}},
+                 motionAt(0.0, 471.0, 0.01), 0.0);
+  TwinState state;
+  state.depth_extra = 1e-4;
+  const std::vector<ContactArc> arcs = contact.actualArcs(state);
+  EXPECT_EQ(arcs[0].depth, 1e-3);
+  EXPECT_NEAR(arcs[1].depth, 0.9e-3, 1e-12);
+  EXPECT_NEAR(arcs[2].depth, 2.1e-3, 1e-12);
+  EXPECT_EQ(arcs[2].bottom, 1e-3);
 }
 
 /// A slot with four straight teeth, of which one breaks after two revolutions and is whole again after five.

@@ -31,10 +31,18 @@ Workpiece box() {
   return w;
 }
 
+ToolGeometry endMill(double radius, double corner_radius = 0.0) {
+  ToolGeometry tool;
+  tool.teeth = 4;
+  tool.diameter = 2.0 * radius;
+  tool.edge.corner_radius = corner_radius;
+  return tool;
+}
+
 // ---- stock
 
 TEST(Stock, FullSlotIsHalfTheTool) {
-  const Stock stock(box(), RADIUS);
+  const Stock stock(box(), endMill(RADIUS));
   const std::vector<ContactArc> arcs = stock.contact({0.0, 0.0, -2e-3}, {0.01, 0.0, 0.0});
   ASSERT_EQ(arcs.size(), 1u);
   EXPECT_NEAR(arcs[0].entry, 0.0, 1e-9);
@@ -45,7 +53,7 @@ TEST(Stock, FullSlotIsHalfTheTool) {
 // Width ae at the edge of the stock: up-milling leaves at acos(1 - ae / R), down-milling enters at
 // pi - acos(1 - ae / R) (Altintas, Manufacturing Automation, eq. 2.72).
 TEST(Stock, SideCutsHaveTheTextbookImmersion) {
-  const Stock stock(box(), RADIUS);
+  const Stock stock(box(), endMill(RADIUS));
   const double ae = 2e-3, immersion = std::acos(1.0 - ae / RADIUS);
   // Feed in +x with the stock on the side of +y: the tool overlaps it by ae from y = -40 mm on.
   const std::vector<ContactArc> up = stock.contact({0.0, -40e-3 - RADIUS + ae, -1e-3}, {0.01, 0.0, 0.0});
@@ -59,7 +67,7 @@ TEST(Stock, SideCutsHaveTheTextbookImmersion) {
 }
 
 TEST(Stock, EnteringTheFrontGrowsFromTheMiddle) {
-  const Stock stock(box(), RADIUS);
+  const Stock stock(box(), endMill(RADIUS));
   // The tip of the circle is 1 mm inside: half angle acos(1 - 1 / 8) about the feed direction.
   const std::vector<ContactArc> arcs = stock.contact({-50e-3 - RADIUS + 1e-3, 0.0, -1e-3}, {0.01, 0.0, 0.0});
   const double half = std::acos(1.0 - 1e-3 / RADIUS);
@@ -69,7 +77,7 @@ TEST(Stock, EnteringTheFrontGrowsFromTheMiddle) {
 }
 
 TEST(Stock, FeedInMinusYWrapsOverZero) {
-  const Stock stock(box(), RADIUS);
+  const Stock stock(box(), endMill(RADIUS));
   // Heading -y is the immersion angle pi: the front half is pi/2 .. 3 pi/2; +y gives 3 pi/2 .. 2 pi and 0 ..
   // pi/2.
   const std::vector<ContactArc> minus = stock.contact({0.0, 0.0, -1e-3}, {0.0, -0.01, 0.0});
@@ -85,7 +93,7 @@ TEST(Stock, FeedInMinusYWrapsOverZero) {
 }
 
 TEST(Stock, ASlotIsAir) {
-  Stock stock(box(), RADIUS);
+  Stock stock(box(), endMill(RADIUS));
   for (int k = 0; k <= 200; ++k) {
     const std::array<double, 3> at{-60e-3 + 0.6e-3 * k, 0.0, -2e-3};
     stock.cutTo(at);
@@ -117,7 +125,7 @@ TEST(Stock, ASlotIsAir) {
 
 // Exit at one end and entry at another, at the same depth: the material between remains.
 TEST(Stock, ASlotEndsWhereTheToolLeaves) {
-  Stock stock(box(), RADIUS);
+  Stock stock(box(), endMill(RADIUS));
   stock.cutTo({-40e-3, 40e-3, -2e-3});
   stock.cutTo({60e-3, 40e-3, -2e-3});
   stock.endSlot();
@@ -128,8 +136,133 @@ TEST(Stock, ASlotEndsWhereTheToolLeaves) {
   EXPECT_NEAR(arcs[0].exit, 1.5 * PI, 1e-9);
 }
 
+// A small tool next to the slot of a larger one, and on a ramp into the floor of it.
+TEST(Stock, KeepsTheWidthOfEachToolsSlots) {
+  constexpr double SMALL = 3e-3;
+  Stock stock(box(), endMill(RADIUS));
+  stock.cutTo({-60e-3, 0.0, -2e-3});
+  stock.cutTo({60e-3, 0.0, -2e-3});
+  stock.endSlot();
+  stock.changeTool(endMill(SMALL));
+  // Its axis is 1 mm within the wall: the part of the circle beyond the wall cuts.
+  const std::vector<ContactArc> side = stock.contact({0.0, RADIUS - 1e-3, -2e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(side.size(), 1u);
+  EXPECT_NEAR(side[0].entry, 0.0, 1e-9);
+  EXPECT_NEAR(side[0].exit, std::acos(1e-3 / SMALL), 1e-6);
+  EXPECT_TRUE(stock.contact({0.0, RADIUS - SMALL, -2e-3}, {0.01, 0.0, 0.0}).empty());
+  stock.cutTo({0.0, 0.0, -2.1e-3});
+  stock.cutTo({1e-3, 0.0, -2.2e-3});
+  const std::vector<ContactArc> ramp = stock.contact({2e-3, 0.0, -2.3e-3}, {0.01, 0.0, -1e-3});
+  ASSERT_FALSE(ramp.empty());
+  EXPECT_NEAR(ramp[0].depth, 0.3e-3, 1e-9);
+}
+
+// At each height h a ball of radius R is a circle of radius r = sqrt(R^2 - (R - h)^2).
+double circleOfBall(double radius, double height) {
+  return std::sqrt(height * (2.0 * radius - height));
+}
+
+TEST(Stock, ABallInTheSolidIsHalfACircleAtEachHeight) {
+  const double depth = 1.3e-3;
+  const Stock stock(box(), endMill(RADIUS, RADIUS));
+  const std::vector<ContactArc> arcs = stock.contact({0.0, 0.0, -depth}, {0.01, 0.0, 0.0});
+  ASSERT_GT(arcs.size(), 3u);
+  EXPECT_EQ(arcs.front().bottom, 0.0);
+  for (std::size_t k = 0; k < arcs.size(); ++k) {
+    EXPECT_NEAR(arcs[k].entry, 0.0, 1e-9);
+    EXPECT_NEAR(arcs[k].exit, PI, 1e-9);
+    if (k > 0) {
+      EXPECT_EQ(arcs[k].bottom, arcs[k - 1].depth);
+    }
+  }
+  EXPECT_NEAR(arcs.back().depth, depth, 1e-3 * depth);
+}
+
+// Raster with a step s in a plane: at each height the slot before has the same half width r, so that the
+// material is at y > r, where s + r cos(phi) > r: from +y to acos(1 - s / r), for r < s / 2 everywhere.
+TEST(Stock, ABallNextToItsLastSlotLeavesTheClosedFormOfTheStep) {
+  const double depth = 1.0e-3, step = 0.8e-3;
+  Stock stock(box(), endMill(RADIUS, RADIUS));
+  stock.cutTo({-60e-3, 0.0, -depth});
+  stock.cutTo({60e-3, 0.0, -depth});
+  stock.endSlot();
+  const std::vector<ContactArc> arcs = stock.contact({0.0, step, -depth}, {0.01, 0.0, 0.0});
+  ASSERT_GT(arcs.size(), 3u);
+  for (const ContactArc& arc : arcs) {
+    const double r = circleOfBall(RADIUS, 0.5 * (arc.bottom + arc.depth));
+    EXPECT_NEAR(arc.entry, 0.0, 1e-9);
+    EXPECT_NEAR(arc.exit, r < 0.5 * step ? PI : std::acos(1.0 - step / r), 2e-3) << r;
+  }
+  EXPECT_NEAR(arcs.back().depth, depth, 1e-3 * depth);
+}
+
+// The floor of a ball's slot on a slope: a cylinder of the ball's radius along the slope, whose lowest line
+// is R / cos(slope) below the centre.
+TEST(Stock, ASlotOnASlopeIsATiltedCylinder) {
+  constexpr double SMALL = 0.25e-3;
+  const double slope = 0.1, length = 60e-3;
+  Stock stock(box(), endMill(RADIUS, RADIUS));
+  // Also in many parts.
+  for (int k = 0; k <= 100; ++k)
+    stock.cutTo({-30e-3 + 0.01 * k * length, 0.0, -1e-3 - 0.01 * k * length * slope});
+  stock.endSlot();
+  stock.changeTool(endMill(SMALL));
+  for (const double x : {-10e-3, 0.0, 10e-3}) {
+    const double centre = -1e-3 - slope * (x + 30e-3) + RADIUS;
+    const double floor = centre - RADIUS * std::sqrt(1.0 + slope * slope);
+    // The front of a thin tool that feeds in +y, at this x.
+    const std::vector<ContactArc> arcs = stock.contact({x, -SMALL, -20e-3}, {0.0, 0.01, 0.0});
+    ASSERT_FALSE(arcs.empty());
+    double lowest = 1.0, highest = 0.0;
+    for (const ContactArc& arc : arcs) {
+      lowest = std::min(lowest, arc.depth);
+      highest = std::max(highest, arc.depth);
+    }
+    // Across the tool the floor rises by slope times its radius.
+    EXPECT_NEAR(0.5 * (lowest + highest) - 20e-3, floor, 6e-5) << x;
+  }
+}
+
+// A bull nose has its corner and, above it, its side; it may plunge as little as an end mill.
+TEST(Stock, ABullNoseHasACornerAndASide) {
+  const double corner = 1e-3, depth = 3e-3, ae = 2e-3;
+  const Stock stock(box(), endMill(RADIUS, corner));
+  const std::vector<ContactArc> arcs = stock.contact({0.0, -40e-3 - RADIUS + ae, -depth}, {0.01, 0.0, 0.0});
+  ASSERT_GT(arcs.size(), 2u);
+  for (const ContactArc& arc : arcs) {
+    const double below = corner - std::min(corner, 0.5 * (arc.bottom + std::min(arc.depth, corner)));
+    const double r = RADIUS - corner + std::sqrt(corner * corner - below * below);
+    EXPECT_NEAR(arc.exit, std::acos((RADIUS - ae) / r), 1e-5);
+  }
+  EXPECT_NEAR(arcs.back().bottom, corner, 1e-12);
+  EXPECT_NEAR(arcs.back().depth, depth, 1e-12);
+  EXPECT_TRUE(stock.hasMaterialAbove({0.0, 0.0, -depth}));
+  EXPECT_FALSE(Stock(box(), endMill(RADIUS, RADIUS)).hasMaterialAbove({0.0, 0.0, -depth}));
+}
+
+// A rising surface of slope t advances where sin(phi) > rise / t; that of a ball at height h has the slope
+// r / (R - h).
+TEST(Stock, ARisingBallDoesNotCutAtItsSides) {
+  const double depth = 2e-3, rise = 0.2;
+  const Stock stock(box(), endMill(RADIUS, RADIUS));
+  const std::vector<ContactArc> arcs = stock.contact({0.0, 0.0, -depth}, {0.01, 0.0, 0.01 * rise});
+  ASSERT_GT(arcs.size(), 3u);
+  for (const ContactArc& arc : arcs) {
+    const double h = 0.5 * (arc.bottom + arc.depth), slope = circleOfBall(RADIUS, h) / (RADIUS - h);
+    EXPECT_NEAR(arc.entry, std::asin(rise / slope), 1e-6);
+    EXPECT_NEAR(arc.exit, PI - std::asin(rise / slope), 1e-6);
+  }
+  // Behind the tip nothing is cut: the lowest bands are missing.
+  EXPECT_GT(arcs.front().bottom, 0.0);
+  // Down, the whole circle near the tip.
+  const std::vector<ContactArc> down = stock.contact({0.0, 0.0, -depth}, {0.01, 0.0, -0.01 * rise});
+  double span = 0.0;
+  for (const ContactArc& arc : down) span += arc.bottom == 0.0 ? arc.exit - arc.entry : 0.0;
+  EXPECT_NEAR(span, 2.0 * PI, 1e-5);
+}
+
 TEST(Stock, NothingWithoutFeedOrAbove) {
-  const Stock stock(box(), RADIUS);
+  const Stock stock(box(), endMill(RADIUS));
   EXPECT_TRUE(stock.contact({0.0, 0.0, -2e-3}, {0.0, 0.0, 0.0}).empty());
   EXPECT_TRUE(stock.contact({0.0, 0.0, 1e-3}, {0.01, 0.0, 0.0}).empty());
   EXPECT_TRUE(stock.contact({0.1, 0.0, -1e-3}, {0.01, 0.0, 0.0}).empty());
@@ -240,6 +373,43 @@ TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
   EXPECT_NEAR(percent, 100.0 * volt / *s.load_meter_full_scale, 2e-3 * percent);
   // No force before the contact.
   EXPECT_EQ(mean(machine.force[0], 0, static_cast<std::size_t>(1.2 * World::SAMPLE_RATE)), 0.0);
+}
+
+// A slot with each of two tools of the magazine: mean forces of the closed form of each, and a tool that is
+// not in it.
+TEST(World, CutsWithTheToolOfM6) {
+  MachineModel model = millThatCuts(), small = model;
+  small.tool->diameter = 10e-3;
+  small.tool->teeth = 2;
+  small.tool->helix = 0.3;
+  small.cutting->ktc *= 1.5;
+  WorldOptions options;
+  options.magazine = {{1, model}, {7, small}};
+  Machine machine(model, options);
+  machine.program(
+      "G90 G94 G21 G40 G49 G80\nT7 M6\nG43 H7\nG0 X-60\nS6000 M3 \nM8\nG4 P1000\nG1 F6000 Z-1\nG1 F1200 X0\n"
+      "G1 F6000 Z20\nM9\nT1 M6\nG0 X-60 Y30\nS6000 M3\nG4 P1000\nG1 F6000 Z-1\nF2400 X0\n");
+  int tools = 0;
+  for (const auto& [tool, teeth] : {std::pair(7, 2), std::pair(1, 4)}) {
+    while (machine.world.controller().motion().tool != tool || machine.position.back()[2] > -0.9e-3)
+      machine.run(0.1);
+    machine.run(1.0);
+    const std::size_t to = machine.force[0].size(), from = to - 256 * 10;
+    const MachineModel& of = tool == 7 ? small : model;
+    const CuttingForce expected = MechanisticForce(*of.tool, *of.cutting, {0.0, PI, 1e-3, 0.1e-3}).mean();
+    EXPECT_NEAR(mean(machine.force[0], from, to), expected.fx, 2e-3 * std::abs(expected.fx)) << tool;
+    EXPECT_NEAR(mean(machine.force[1], from, to), expected.fy, 2e-3 * std::abs(expected.fy)) << tool;
+    EXPECT_EQ(of.tool->teeth, teeth);
+    ++tools;
+  }
+  EXPECT_EQ(tools, 2);
+  EXPECT_NO_THROW(machine.world.breakTooth(4, 0.0));
+  Machine other(model, options);
+  other.program("T2 M6\n");
+  other.run(0.1);
+  const auto alarms = other.world.controller().calls().state.alarmMessages();
+  ASSERT_EQ(alarms.size(), 1u);
+  EXPECT_NE(alarms[0].text.find("T2 IS NOT IN THE MAGAZINE"), std::string::npos) << alarms[0].text;
 }
 
 // Servo Guide's start trigger at a block (Dunwoody section 6.1): it rises at the begin of that block, i.e. at

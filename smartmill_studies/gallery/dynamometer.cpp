@@ -3,7 +3,9 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gallery/dynamometer_rig.h"
@@ -49,11 +51,22 @@ Cut cutAt(double rpm, std::size_t axis, const ModalModel& sensor, unsigned seed)
   return cut;
 }
 
-/// Sensor model of an axis from nine taps, identified by the product as shipped.
-ModalModel identified(std::size_t axis, unsigned seed, FrequencyResponse* measured = nullptr) {
-  const DynamometerRig::Taps taps = DynamometerRig::taps(axis, 9, seed);
-  if (measured != nullptr) *measured = kalman::averagedFrf(taps.hammer, taps.response, RATE);
-  return kalman::identifySensor(taps.hammer, taps.response, RATE, {}).model;
+/// Sensor of an axis from nine taps, identified by the product as shipped.
+struct Identified {
+  FrequencyResponse measured;
+  ModalModel model;
+};
+
+/// All figures show the same sensor.
+const Identified& identified(std::size_t axis, unsigned seed) {
+  static std::map<std::pair<std::size_t, unsigned>, Identified> sensors;
+  const auto [at, is_new] = sensors.try_emplace({axis, seed});
+  if (is_new) {
+    const DynamometerRig::Taps taps = DynamometerRig::taps(axis, 9, seed);
+    at->second = {kalman::averagedFrf(taps.hammer, taps.response, RATE),
+                  kalman::identifySensor(taps.hammer, taps.response, RATE, {}).model};
+  }
+  return at->second;
 }
 
 double rangeOf(const std::vector<double>& force) {
@@ -64,8 +77,7 @@ double rangeOf(const std::vector<double>& force) {
 Drawn transferFunctions(const std::string& folder, unsigned seed) {
   Drawn drawn;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    FrequencyResponse frf;
-    const ModalModel sensor = identified(axis, seed, &frf);
+    const auto& [frf, sensor] = identified(axis, seed);
     // Linear and time-invariant: an impulse response gives the complete FRF.
     HarmonicFilterParameters parameters;
     parameters.memory_revolutions = parameters.settling_revolutions;
@@ -74,6 +86,7 @@ Drawn transferFunctions(const std::string& folder, unsigned seed) {
     for (std::size_t i = 0; i < answer.size(); ++i) answer[i] = filter.step(i == 0 ? 1.0 : 0.0);
     const auto spectrum = fourier(answer);
     const std::vector<double> lines = fourierFrequencies(answer.size(), RATE);
+    const std::vector<std::complex<double>> response = DynamometerRig::response(axis, lines);
     Rows rows, gains;
     for (std::size_t i = 0; i < frf.size(); ++i) {
       if (frf.frequency[i] < 50.0 || frf.frequency[i] > 5000.0) continue;
@@ -83,8 +96,7 @@ Drawn transferFunctions(const std::string& folder, unsigned seed) {
     double at_tooth = 0.0;
     for (std::size_t i = 0; i < lines.size() && lines[i] < 5000.0; ++i) {
       if (lines[i] < 50.0) continue;
-      gains.push_back({lines[i], std::abs(spectrum[i]),
-                       std::abs(spectrum[i] * DynamometerRig::response(axis, lines[i]))});
+      gains.push_back({lines[i], std::abs(spectrum[i]), std::abs(spectrum[i] * response[i])});
       if (std::abs(lines[i] - 930.0) < 0.5 * lines[1]) at_tooth = gains.back()[2];
     }
     const std::string png = folder + "/dunwoody_5_2_" + AXIS_NAMES[axis] + ".png";
@@ -127,7 +139,7 @@ double waveformError(const Cut& cut, const std::vector<double>& estimated) {
 Drawn atResonance(const std::string& folder, unsigned seed) {
   Drawn drawn;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    const ModalModel sensor = identified(axis, seed);
+    const ModalModel& sensor = identified(axis, seed).model;
     const Cut fast = cutAt(13950.0, axis, sensor, seed), slow = cutAt(750.0, axis, sensor, seed);
     const auto rowsOf = [](const Cut& cut) {
       Rows rows;
@@ -180,7 +192,7 @@ Drawn atResonance(const std::string& folder, unsigned seed) {
 Drawn ranges(const std::string& folder, unsigned seed) {
   Drawn drawn;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    const ModalModel sensor = identified(axis, seed);
+    const ModalModel& sensor = identified(axis, seed).model;
     Rows rows;
     double worst = 0.0, worst_raw = 0.0;
     for (const double rpm : {750.0, 4500.0, 9000.0, 13950.0, 16200.0, 18000.0}) {

@@ -67,14 +67,20 @@ MechanisticForce process() {
 
 }  // namespace
 
-std::complex<double> DynamometerRig::response(std::size_t axis, double frequency) {
-  std::complex<double> sum = 0.0;
-  for (const plant::SensorMode& mode : modesOf(dynamometer(axis), axis, CUT_HEIGHT)) {
-    const double r = frequency / mode.frequency;
-    sum += mode.input[axis] * mode.output[axis] /
-           std::complex<double>(1.0 - r * r, 2.0 * mode.damping_ratio * r);
+std::vector<std::complex<double>> DynamometerRig::response(std::size_t axis,
+                                                           const std::vector<double>& frequencies) {
+  const std::vector<plant::SensorMode> modes = modesOf(dynamometer(axis), axis, CUT_HEIGHT);
+  std::vector<std::complex<double>> responses;
+  for (const double frequency : frequencies) {
+    std::complex<double> sum = 0.0;
+    for (const plant::SensorMode& mode : modes) {
+      const double r = frequency / mode.frequency;
+      sum += mode.input[axis] * mode.output[axis] /
+             std::complex<double>(1.0 - r * r, 2.0 * mode.damping_ratio * r);
+    }
+    responses.push_back(sum);
   }
-  return sum;
+  return responses;
 }
 
 DynamometerRig::Taps DynamometerRig::taps(std::size_t axis, int count, unsigned seed) {

@@ -15,8 +15,8 @@ struct DynamometerRig {
   static constexpr double RATE = 25600.0;  ///< [Hz]
   static constexpr double NOISE = 1.0;     ///< [N] of a sample, standard deviation
 
-  /// True response of an axis at the cut [1], without the other axis' share.
-  static std::complex<double> response(std::size_t axis, double frequency);
+  /// True responses of an axis at the cut [1], without the other axis' share, at the frequencies [Hz].
+  static std::vector<std::complex<double>> response(std::size_t axis, const std::vector<double>& frequencies);
 
   /// Records of taps along an axis [N], 0.2 s each: sin^2 pulses of 0.2 ms and 500 N.
   struct Taps {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <random>
 #include <thread>
+#include <utility>
 
 #include "smartmill_cnc/bridge.h"
 #include "smartmill_core/error.h"
@@ -27,25 +28,36 @@ cnc::MotionParameters motionOf(const MachineModel& model) {
   return motion;
 }
 
+/// As an operator: stores the program, selects it and presses cycle start.
+void startFromMemory(sim::Controller& controller, const std::string& text) {
+  const int number = std::stoi(text.substr(text.find('O') + 1));
+  controller.setMode(focas::AUT_MEM);
+  focas::ProgramsInterface& programs = controller.calls().programs;
+  for (const focas::EwCode code :
+       {programs.storePrograms(text), programs.selectProgram(number), programs.cycleStart()})
+    if (code != focas::EW_OK) throw Error(std::string("program: ") + focas::ewName(code));
+}
+
 }  // namespace
 
 std::shared_ptr<const program::LiveProgram> preparedPart(const std::string& text,
-                                                         const std::string& model_file,
+                                                         const std::vector<std::string>& tools,
                                                          const MachineModel& model) {
-  program::ToolModels tools({model_file});
-  program::Stock stock({model.workpiece->low, model.workpiece->high}, 1e-4);
+  program::ToolModels models(tools);
+  program::Stock stock(program::StockBlock{model.workpiece->low, model.workpiece->high}, 1e-4);
   return std::make_shared<const program::LiveProgram>(
-      program::prepareProgram("pocket.nc", program::interpretProgram(text, "pocket.nc"), tools, stock,
+      program::prepareProgram("pocket.nc", program::interpretProgram(text, "pocket.nc"), models, stock,
                               program::SimulationOptions(), program::StretchParameters()));
 }
 
 MachinedPart machinePart(const MachineModel& machine, const MachineModel& nominal, const std::string& text,
                          const std::shared_ptr<const program::LiveProgram>& program, std::uint64_t seed,
-                         const PartStreams& streams) {
+                         const PartStreams& streams, const PartSetUp& set_up) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> late(0.0, LATE);
   sim::WorldOptions options;
   options.seed = seed;
+  options.magazine = set_up.magazine;
   sim::World world(machine, options);
   focas::ServerOptions server_options;
   server_options.port = 0;
@@ -60,7 +72,7 @@ MachinedPart machinePart(const MachineModel& machine, const MachineModel& nomina
   MachinedPart part;
   sim::World::Block block;
   double now = 0.0;
-  bool started = false;
+  bool started = false, running = false;
   while (now < MOST_TIME) {
     for (int i = 0; i < 2; ++i) {
       world.advance(block);
@@ -79,6 +91,21 @@ MachinedPart machinePart(const MachineModel& machine, const MachineModel& nomina
         part.air += condition->kind == CuttingCondition::Kind::air;
         streams.condition(*condition);
       }
+    }
+    if (set_up.from_memory) {
+      if (!started && state.connected) {
+        startFromMemory(world.controller(), text);
+        started = true;
+        part.time = -now;
+      }
+      if (state.alarm) throw Error("program: " + state.alarm_text);
+      const bool runs = state.run == CncRun::start;
+      if (started && std::exchange(running, runs) && !runs) {
+        part.time += now;
+        part.lost = follower.status().lost;
+        return part;
+      }
+      continue;
     }
     if (!started && state.connected && !state.armed) {
       const auto answer = bridge.arm(true);

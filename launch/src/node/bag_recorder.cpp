@@ -100,8 +100,9 @@ void BagRecorder::write(const std::string& topic, Event event) {
   ++topics_[topic].messages;
 }
 
-bool BagRecorder::follow(smartmill_msgs::Follow::Request&, smartmill_msgs::Follow::Response& response) {
-  subscribe();
+bool BagRecorder::follow(smartmill_msgs::Follow::Request& request,
+                         smartmill_msgs::Follow::Response& response) {
+  if (request.phase == smartmill_msgs::Follow::Request::BEGIN) subscribe();
   for (const auto& [topic, recorded] : topics_) {
     response.topics.push_back(topic);
     response.taken.push_back(recorded.messages);

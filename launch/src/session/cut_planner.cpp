@@ -145,7 +145,6 @@ PlannedCut CutPlanner::air(double speed, double time) const {
   air.condition.material = material_;
   air.condition.tool_name = parameters_.tool;
   air.condition.tool = tool_;
-  air.condition.tool.pitch.clear();
   air.condition.spindle_speed = units::radPerSecFromRpm(rpm);
   checkSpeed(air.condition.name, speed);
   air.spin_up = spinUp(speed);
@@ -194,7 +193,6 @@ PlannedCut CutPlanner::slot(const SlotRequest& request) const {
   condition.material = material_;
   condition.tool_name = parameters_.tool;
   condition.tool = tool_;
-  condition.tool.pitch.clear();
   condition.engagement = {down ? 0.5 * units::PI : 0.0, half && !down ? 0.5 * units::PI : units::PI,
                           request.depth, request.feed_per_tooth};
   condition.spindle_speed = units::radPerSecFromRpm(rpm);

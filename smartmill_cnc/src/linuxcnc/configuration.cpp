@@ -48,6 +48,15 @@ std::string iniOf(const MachineAxes& axes, double max_rpm, const std::string& fo
   return ini.str();
 }
 
+std::string toolTable(int tools) {
+  std::string table;
+  for (int k = 1; k <= tools; ++k) {
+    const std::string number = std::to_string(k);
+    table += "T" + number + " P" + number + " D10 Z0\n";
+  }
+  return table;
+}
+
 void setp(std::ostringstream& hal, const char* pin, double value) {
   hal << "setp " << pin << " " << number(value) << "\n";
 }
@@ -113,6 +122,7 @@ std::string halOf(double spindle_acceleration, const ConfigurationOptions& optio
          "net dtg motion.distance-to-go => sampler.0.pin.6\n"
       << "net " << LOAD_SIGNAL << " sampler.0.pin.7\n"
       << "net marker motion.analog-out-00 => sampler.0.pin.8\n"
+         "net t-number iocontrol.0.tool-number => sampler.0.pin.9\n"
          "# Without the beat and the permit of linuxcnc_stream no axis and no spindle moves, and the "
          "emergency "
          "stop is set\n"
@@ -137,7 +147,7 @@ std::map<std::string, std::string> configurationOf(const MachineModel& model, co
   }
   return {{"mill.ini", iniOf(axes, units::rpmFromRadPerSec(*spindle.max_speed), folder, options)},
           {"mill.hal", halOf(units::rpmFromRadPerSec(*spindle.acceleration), options)},
-          {"mill.tbl", "T1 P1 D10 Z0 ;end mill\n"}};
+          {"mill.tbl", toolTable(options.tools)}};
 }
 
 }  // namespace smartmill::cnc::linuxcnc

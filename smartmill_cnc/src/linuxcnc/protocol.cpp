@@ -13,7 +13,7 @@ namespace {
 static_assert(sizeof(double) == 8, "doubles are sent as eight bytes");
 
 /// Longest payload of each kind; kinds are numbered from 1 in the order of Message.
-constexpr std::size_t SAMPLE = 9 * sizeof(double);  // [byte]
+constexpr std::size_t SAMPLE = 10 * sizeof(double);  // [byte]
 constexpr std::array<std::size_t, std::variant_size_v<Message>> LONGEST{
     LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST* SAMPLE, 8, 16};
 
@@ -194,8 +194,8 @@ void pack(const ServoBlock& m, Packer& p) {
   p.number(static_cast<std::uint32_t>(m.samples.size()));
   for (const ServoSample& s : m.samples) {
     p.numbers(s.position);
-    p.numbers(std::array<double, 6>{s.revolutions, s.spindle_speed, s.velocity, s.distance_to_go,
-                                    s.spindle_load, s.marker});
+    p.numbers(std::array<double, 7>{s.revolutions, s.spindle_speed, s.velocity, s.distance_to_go,
+                                    s.spindle_load, s.marker, s.tool});
   }
 }
 
@@ -210,8 +210,8 @@ void unpack(ServoBlock& m, Unpacker& u) {
   m.samples.resize(count);
   for (ServoSample& s : m.samples) {
     u.numbers(s.position);
-    for (double* value :
-         {&s.revolutions, &s.spindle_speed, &s.velocity, &s.distance_to_go, &s.spindle_load, &s.marker}) {
+    for (double* value : {&s.revolutions, &s.spindle_speed, &s.velocity, &s.distance_to_go, &s.spindle_load,
+                          &s.marker, &s.tool}) {
       *value = u.finite();
     }
   }

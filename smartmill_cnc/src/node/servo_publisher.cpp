@@ -63,13 +63,14 @@ void ServoPublisher::publish(const linuxcnc::ServoSegment& segment) {
   block.sample_rate = 1.0 / PERIOD;
   block.first_index = segment.first;
   block.channels = {
-      "x", "y", "z", "revolutions", "spindle_speed", "velocity", "distance_to_go", "spindle_load", "marker"};
-  block.units = {"m", "m", "m", "1", "rad/s", "m/s", "m", "1", "1"};
+      "x",      "y",   "z", "revolutions", "spindle_speed", "velocity", "distance_to_go", "spindle_load",
+      "marker", "tool"};
+  block.units = {"m", "m", "m", "1", "rad/s", "m/s", "m", "1", "1", "1"};
   SpindleAngle angle;
   for (const linuxcnc::ServoSample& s : segment.samples) {
     block.samples.insert(block.samples.end(),
                          {s.position[0], s.position[1], s.position[2], s.revolutions, s.spindle_speed,
-                          s.velocity, s.distance_to_go, s.spindle_load, s.marker});
+                          s.velocity, s.distance_to_go, s.spindle_load, s.marker, s.tool});
     const auto index = static_cast<double>(block.size() - 1);
     angle.stamp = segment.stamp + index * PERIOD;
     angle.angle = wrapped(units::TWO_PI * (s.revolutions - std::floor(s.revolutions)));

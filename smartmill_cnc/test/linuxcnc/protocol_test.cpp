@@ -36,6 +36,7 @@ ServoBlock someBlock(std::size_t count) {
     s.position = {0.1 * static_cast<double>(i), -1.0, 2.0};
     s.revolutions = 1e6 + 0.1;
     s.marker = 3.0;
+    s.tool = 12.0;
     block.samples.push_back(s);
   }
   return block;
@@ -97,6 +98,7 @@ TEST(Protocol, FieldsAreUnchanged) {
   EXPECT_EQ(block.first, 4'294'967'290u);
   EXPECT_EQ(block.samples.at(1).position[0], 0.1);
   EXPECT_EQ(block.samples.at(1).marker, 3.0);
+  EXPECT_EQ(block.samples.at(1).tool, 12.0);
 }
 
 TEST(Protocol, InvalidFramesAreRefusedInOneLine) {

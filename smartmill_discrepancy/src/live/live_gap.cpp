@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "smartmill_core/campaign/slow_channels.h"
+#include "smartmill_core/cutting/same_tool.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/frames.h"
@@ -85,12 +86,21 @@ MachineModel comparedModel(MachineModel model, ComparedForce compared) {
   return model;
 }
 
+bool hasOtherTool(const RecordSegment& segment, const MachineModel& model) {
+  const bool stated = segment.tool.teeth > 0 && segment.tool.diameter > 0.0;
+  return segment.test.kind == TestKind::cut && stated && model.tool && !isSameTool(*model.tool, segment.tool);
+}
+
 LiveGap liveGap(const MachineModel& model, const RecordSegment& segment, const LiveGapOptions& options) {
   if (!model.force_sensor.noise_rms)
     throw Error(model.file + ": force_sensor.noise_rms_n: not found, expected for the gap");
   LiveGap result;
   result.stamp = segment.stamp;
   result.condition = segment.test.name;
+  if (hasOtherTool(segment, model)) {
+    result.exclusion = "is cut with another tool than that of the model";
+    return result;
+  }
   if (const auto chatter = findChatter(segment.record, segment.test, 0)) {
     result.exclusion = chatterText(*chatter);
     return result;

@@ -71,6 +71,8 @@ std::size_t SegmentCampaign::write(const MachineModel& model, const LiveGapOptio
   for (const RecordSegment& segment : segments_) {
     if (segment.test.kind != TestKind::cut) {
       air.push_back(&segment);
+    } else if (hasOtherTool(segment, model)) {
+      progress(segment.test.name + ": omitted, cut with another tool than that of the model");
     } else if (model.force_sensor.noise_rms && liveGap(model, segment, options).near_limit) {
       progress(segment.test.name + ": omitted, near the stability limit of the model");
     } else {

@@ -13,12 +13,14 @@
 namespace smartmill::discrepancy {
 namespace {
 
-/// Whether the feed of a cut is in the plane of the table; on a ramp the end face cuts as well.
-bool isLevel(const CuttingCondition& condition) {
+/// Whether a campaign can state a cut: a feed in the plane of the table (on a ramp the end face cuts as well)
+/// and one engagement over the whole depth.
+bool isPlain(const CuttingCondition& condition) {
   constexpr double LEVEL = 1e-3;  // [1]
   const auto& from = condition.steady_from;
   const auto& to = condition.steady_to;
-  return std::abs(to[2] - from[2]) <= LEVEL * std::hypot(to[0] - from[0], to[1] - from[1]);
+  return condition.engagement.bands.empty() &&
+         std::abs(to[2] - from[2]) <= LEVEL * std::hypot(to[0] - from[0], to[1] - from[1]);
 }
 
 }  // namespace
@@ -57,7 +59,7 @@ void SegmentRecorder::handle(const CncState& state) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   const bool cut = condition_->kind == CuttingCondition::Kind::cut;
   const bool path =
-      !cut || (isLevel(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));
+      !cut || (isPlain(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));
   const bool steady = path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < limits_.speed;
   if (steady && !steady_since_) steady_since_ = state.stamp;
   if (!steady && steady_since_) {
@@ -197,6 +199,7 @@ void SegmentRecorder::finish() {
     RecordSegment segment;
     segment.stamp = end;
     segment.test = testOf(begin, rotation->speed);
+    segment.tool = condition_->tool;
     segment.record = recordOf(segment.test.name, *rotation);
     for (const LoadSample& l : loads_) {
       if (l.stamp >= begin && l.stamp <= end) segment.load.push_back({l.stamp - begin, l.spindle_load});

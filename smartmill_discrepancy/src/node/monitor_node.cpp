@@ -81,6 +81,7 @@ void MonitorNode::publishForce(const RecordSegment& segment) {
 }
 
 void MonitorNode::record(const RecordSegment& segment) {
+  if (hasOtherTool(segment, model_)) return;
   int& of_condition = recorded_of_[segment.test.name];
   if (parameters_.record_folder.empty() || recorded_ >= parameters_.most_recorded ||
       of_condition >= parameters_.most_per_condition ||

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -79,25 +80,31 @@ RefinedState iterate(Workbench& bench, FitState from, FitResult* best, const Sea
   return refined;
 }
 
-// Alternatives of a member among the candidates of the round that accepted it.
+// Alternatives of a member among the candidates of the rounds that accepted it, the latest fit of each.
 std::vector<const Candidate*> alternativesOf(const FitState& state, std::size_t member,
                                              const std::vector<Candidate>& candidates,
                                              const SearchOptions& options) {
   const Hypothesis& own = *state.members[member].hypothesis;
-  std::size_t round = 0;
+  std::map<std::size_t, double> largest;  // gain of the rounds
   for (const Candidate& r : candidates) {
     if (r.result.accepted && r.result.effect == own.effect && r.result.variant == own.variant)
-      round = r.result.round;
+      largest[r.result.round] = 0.0;
   }
-  double largest = 0.0;
   for (const Candidate& r : candidates) {
-    if (r.result.round == round) largest = std::max(largest, r.result.delta_bic);
+    const auto round = largest.find(r.result.round);
+    if (round != largest.end()) round->second = std::max(round->second, r.result.delta_bic);
   }
   std::vector<const Candidate*> alternatives;
   for (const Candidate& r : candidates) {
-    if (r.result.round == round && r.result.effect != own.effect &&
-        r.result.delta_bic >= options.near * largest && !hasMember(state, r.result.effect, r.result.variant))
-      alternatives.push_back(&r);
+    const auto round = largest.find(r.result.round);
+    if (round == largest.end() || r.result.effect == own.effect ||
+        r.result.delta_bic < options.near * round->second ||
+        hasMember(state, r.result.effect, r.result.variant))
+      continue;
+    const auto isEarlier = [&](const Candidate* a) { return a->hypothesis == r.hypothesis; };
+    alternatives.erase(std::remove_if(alternatives.begin(), alternatives.end(), isEarlier),
+                       alternatives.end());
+    alternatives.push_back(&r);
   }
   return alternatives;
 }

@@ -58,7 +58,7 @@ Written write(const std::vector<RecordSegment>& segments) {
   return w;
 }
 
-constexpr Engagement SLOT{0.0, PI, MM, 0.1 * MM};
+const Engagement SLOT{0.0, PI, MM, 0.1 * MM};
 
 // A production of one pocket: many equal cuts and a few others. All of the others are kept.
 TEST(SegmentCampaign, keepsTheCutsThatDifferMostInOrderOfTime) {

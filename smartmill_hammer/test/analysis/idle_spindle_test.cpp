@@ -33,7 +33,7 @@ struct Plant {
     std::uint64_t index = 0;
     std::normal_distribution<double> normal;
     for (const double w : speeds) {
-      idle.push(CuttingCondition{time, CuttingCondition::Kind::air, "air", "", "T1", {}, {}});
+      idle.push(CuttingCondition{time, CuttingCondition::Kind::air, "air", "", "T1", {}, {}, {}});
       const double r = w / units::TWO_PI / 930.0;
       const std::complex<double> line = unbalance * w * w / std::complex<double>(1.0 - r * r, 0.04 * r);
       for (double until = time + TIME; time < until;) {
@@ -54,7 +54,7 @@ struct Plant {
         index += BLOCK;
       }
       // A cut with engagement is not evaluated.
-      idle.push(CuttingCondition{time, CuttingCondition::Kind::cut, "cut", "", "T1", {}, {}});
+      idle.push(CuttingCondition{time, CuttingCondition::Kind::cut, "cut", "", "T1", {}, {}, {}});
       idle.push(SpindleAngle{time, 0.0, w});
       idle.push(
           SampleBlock{time, RATE, index, {"fx", "fz"}, {"N", "N"}, std::vector<double>(2 * BLOCK, 900.0)});

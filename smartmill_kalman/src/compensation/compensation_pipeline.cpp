@@ -102,12 +102,12 @@ double CompensationPipeline::ageOfModes() const {
 // that releases it.
 void CompensationPipeline::push(SampleBlock channels) {
   const bool combines = channels_ && channels_->isOf(channels);
-  SampleBlock block = combines ? channels_->forces(channels) : channels;
+  SampleBlock block = combines ? channels_->forces(channels) : std::move(channels);
   forces_.check(block);
   const double stamp = block.stamp;
-  sorter_.push(blocks_, stamp, [this, channels = std::move(channels), block = std::move(block)] {
+  sorter_.push(blocks_, stamp, [this, block = std::move(block)] {
     try {
-      handle(channels, block);
+      handle(block);
     } catch (const Error& error) {
       if (!outputs_.block_error) throw;
       outputs_.block_error(error.what());
@@ -116,7 +116,7 @@ void CompensationPipeline::push(SampleBlock channels) {
   });
 }
 
-void CompensationPipeline::handle(const SampleBlock& channels, const SampleBlock& block) {
+void CompensationPipeline::handle(const SampleBlock& block) {
   identification_.handleChannels(block);
   if (const SampleBlock* forces = forces_.handle(block)) identification_.handleForces(*forces);
 }

@@ -27,9 +27,9 @@ constexpr double REPEAT = 5.0;  // [s] between lines about a disagreement that l
 // Krc / Ktc of metals with edge forces is 0.1 to 0.8.
 constexpr double LEAST_RADIAL = -0.2, LARGEST_RADIAL = 1.5;
 
-// An inclined edge has a shorter lever and a radial force that is partly axial.
+// An inclined edge has a shorter lever and a radial force that is partly axial; bands have several arcs.
 bool isMilledSideways(const CuttingCondition& condition) {
-  return condition.tool.teeth > 0 && !condition.tool.edge.inclined() &&
+  return condition.tool.teeth > 0 && !condition.tool.edge.inclined() && condition.engagement.bands.empty() &&
          (condition.steady_to[0] != condition.steady_from[0] ||
           condition.steady_to[1] != condition.steady_from[1]);
 }
@@ -134,7 +134,7 @@ std::array<double, 2> TorqueCheck::torquesOf(const std::array<double, 3>& sensor
   const double x = condition_->steady_to[0] - condition_->steady_from[0],
                y = condition_->steady_to[1] - condition_->steady_from[1], length = std::hypot(x, y);
   const double fx = (x * force[0] + y * force[1]) / length, fy = (x * force[1] - y * force[0]) / length;
-  const auto [entry, exit, depth, feed] = condition_->engagement;
+  const double entry = condition_->engagement.entry, exit = condition_->engagement.exit;
   const double a = 0.5 * (std::pow(std::sin(exit), 2) - std::pow(std::sin(entry), 2)),
                b = 0.5 * (exit - entry) - 0.25 * (std::sin(2.0 * exit) - std::sin(2.0 * entry)),
                s = std::cos(entry) - std::cos(exit);

@@ -40,9 +40,39 @@ void CutForces::addMotors(const MotorRecord& record, const std::array<double, 3>
   test->force->name = test->condition.name;
 }
 
+namespace {
+
+/// Of the last air cut: the zero of the sensor.
+std::optional<ForceMeasurement> sensorInAir(const std::vector<LoadTest>& air_cuts) {
+  std::optional<ForceMeasurement> air;
+  for (const LoadTest& test : air_cuts)
+    if (test.sensor) air = test.sensor;
+  return air;
+}
+
+}  // namespace
+
+MeanForce CutForces::meanForce(const LoadTest& cut, const std::vector<LoadTest>& air_cuts) const {
+  MeanForce mean;
+  if (feedTurns(cut.condition)) return mean;
+  if (cut.sensor) {
+    const std::optional<ForceMeasurement> air = sensorInAir(air_cuts);
+    mean.gain_error = force_parameters_.sensor_error;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const Estimate force = cut.sensor->meanAbove(air, a);
+      mean.axis[a] = {force.value, std::hypot(force.std_dev, force_parameters_.sensor_zero)};
+    }
+  } else if (cut.force) {
+    mean.axis = cut.force->force;
+    mean.gain_error = force_parameters_.motor_error;
+  }
+  return mean;
+}
+
 std::optional<ForceEstimate> CutForces::estimate(const LoadTest& cut, const std::optional<Estimate>& torque,
                                                  const std::vector<LoadTest>& air_cuts,
                                                  bool without_motors) const {
+  if (feedTurns(cut.condition)) return std::nullopt;
   CutMeasurements readings;
   readings.stamp = cut.stamp;
   readings.name = cut.condition.name;
@@ -59,10 +89,7 @@ std::optional<ForceEstimate> CutForces::estimate(const LoadTest& cut, const std:
     readings.motor_other = cut.force->other;
   }
   if (cut.sensor) {
-    std::optional<ForceMeasurement> air;
-    for (const LoadTest& test : air_cuts) {
-      if (test.sensor) air = test.sensor;
-    }
+    const std::optional<ForceMeasurement> air = sensorInAir(air_cuts);
     for (std::size_t a = 0; a < 3; ++a) {
       readings.sensor_force[a] = cut.sensor->meanAbove(air, a);
       readings.sensor_rms[a] = cut.sensor->rmsAbove(air, a);

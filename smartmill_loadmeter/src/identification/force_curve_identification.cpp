@@ -166,6 +166,7 @@ void ForceCurveIdentification::closeCut() {
                      100.0 * revolution.restless()));
     return;
   }
+  if (!condition_->engagement.bands.empty()) return reject("the engagement changes over the height");
   Cut cut{last_sample_, condition_->name, revolution.record()};
   cut.record.engagement = condition_->engagement;
   std::vector<Cut>& cuts = cuts_[{condition_->tool_name, condition_->material}];

@@ -129,7 +129,7 @@ void LoadMeterIdentification::storeTest(LoadTest test) {
   if (cut) {
     torque = torqueOf(test);
     const double own_std = test.torqueStdAsVoltage() / (spindle_.load_meter_gain * test.speed);
-    const auto record = production_.add(test, torque, own_std);
+    const auto record = production_.add(test, torque, own_std, forces_.meanForce(test, session_.air_cuts));
     if (record && outputs_.cut) outputs_.cut(*record);
   }
   forces_.calibrate(test, torque, session_.air_cuts);

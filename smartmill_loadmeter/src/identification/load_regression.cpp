@@ -75,9 +75,10 @@ void LoadRegression::residuals(const LoadState& state, const LoadTerms& terms, c
       quantity[RUNOUT_X] = u.runout.x - state.point.runout.x;
       quantity[RUNOUT_Y] = u.runout.y - state.point.runout.y;
     }
-    const Eigen::VectorXd residual =
-        (r.rows * quantity.cwiseQuotient(loadUnits()) - r.target) / (state.noise * r.spread);
-    for (Eigen::Index i = 0; i < residual.size(); ++i) *out++ = residual[i];
+    Eigen::Map<Eigen::VectorXd> residual(out, r.target.size());
+    residual.noalias() = r.rows.lazyProduct(quantity.cwiseQuotient(loadUnits()));
+    residual = (residual - r.target) / (state.noise * r.spread);
+    out += residual.size();
   }
   for (const Prior& p : friction_priors_) *out++ = (v[p.unknown] - p.value) / p.std_dev;
   if (runout_prior_ > 0.0) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "inspection/weighted_fit.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
@@ -53,6 +54,8 @@ void RecursiveCoefficients::update(const TorqueMeasurement& reading) {
       d0;
   const double error = reading.torque - s.tc * value_[0] - s.te * value_[1];
   innovation_ = error / std::sqrt(variance + expected + reading.common_std * reading.common_std);
+  squares_ = keep * squares_ + innovation_ * innovation_;
+  weight_ = keep * weight_ + 1.0;
   add(information_, s, variance);
   pull_[0] += s.tc * reading.common_std / variance;
   pull_[1] += s.te * reading.common_std / variance;
@@ -68,14 +71,28 @@ std::array<double, 2> RecursiveCoefficients::common() const {
   return {(information_[2] * pull_[0] - information_[1] * pull_[1]) / d,
           (information_[0] * pull_[1] - information_[1] * pull_[0]) / d};
 }
+
+double RecursiveCoefficients::misfit() const {
+  return widening(squares_, weight_ - static_cast<double>(value_.size()));
+}
+
+/// Standard deviations without the common error.
+std::array<double, 2> RecursiveCoefficients::independent() const {
+  const double d = determinant(information_), factor = misfit();
+  return {std::min(factor * std::sqrt(information_[2] / d), 1.0 / std::sqrt(start_[0])),
+          std::min(factor * std::sqrt(information_[0] / d), 1.0 / std::sqrt(start_[2]))};
+}
+
 double RecursiveCoefficients::ktcStd() const {
-  return std::hypot(std::sqrt(information_[2] / determinant(information_)), common()[0]);
+  return std::hypot(independent()[0], common()[0]);
 }
 double RecursiveCoefficients::kteStd() const {
-  return std::hypot(std::sqrt(information_[0] / determinant(information_)), common()[1]);
+  return std::hypot(independent()[1], common()[1]);
 }
 double RecursiveCoefficients::covariance() const {
-  return -information_[1] / determinant(information_) + common()[0] * common()[1];
+  const double correlation = -information_[1] / std::sqrt(information_[0] * information_[2]);
+  const std::array<double, 2> own = independent(), shared = common();
+  return correlation * own[0] * own[1] + shared[0] * shared[1];
 }
 
 namespace {

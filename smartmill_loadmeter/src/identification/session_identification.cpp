@@ -12,6 +12,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/knowledge.h"
 #include "smartmill_loadmeter/identification/cut_forces.h"
+#include "smartmill_loadmeter/identification/force_coefficients.h"
 #include "smartmill_loadmeter/identification/idle_torque.h"
 #include "smartmill_loadmeter/motor/joint.h"
 
@@ -94,6 +95,7 @@ std::string addMotorCoefficients(const std::vector<LoadTest>& cuts, const IdleTo
   std::vector<JointMeasurement> readings;
   bool any = false;
   for (const LoadTest& cut : cuts) {
+    if (feedTurns(cut.condition)) continue;
     JointMeasurement r;
     r.tool = cut.condition.tool;
     r.engagement = cut.condition.engagement;
@@ -113,18 +115,7 @@ std::string addMotorCoefficients(const std::vector<LoadTest>& cuts, const IdleTo
     return std::string("; motor currents: ") + error.what();
   }
   std::string text;
-  for (std::size_t i = 0; i < cuttingKeys().size(); ++i) {
-    if (i == 0 || i == 3) continue;
-    const auto coefficient = cuttingKeys()[i].coefficient;
-    record->set.value.*coefficient = joint.value.*coefficient;
-    record->set.std_dev.*coefficient = joint.std_dev.*coefficient;
-    for (std::size_t j = 0; j < cuttingKeys().size(); ++j) {
-      const double c = joint.covariance[6 * i + j];
-      if (std::isfinite(c)) {
-        record->covariance[CoefficientRecord::covarianceIndex(std::min(i, j), std::max(i, j))] = c;
-      }
-    }
-  }
+  addForceCoefficients(joint, record);
   for (const std::string& name : joint.not_observable) text += (text.empty() ? "" : ", ") + name;
   record->set.source = "load_meter and motor_current";
   return text.empty() ? "; all six coefficients observable with motor currents"

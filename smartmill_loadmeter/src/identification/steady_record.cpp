@@ -62,13 +62,17 @@ void SteadyRecord::handle(const CncState& state) {
   if (!isTest()) return;
   // In air the tool may be at rest; if it moves, the feed drives show their friction.
   const bool on_path =
-      state.connected && state.motion && onSteadyPath(*condition_, state, parameters_.path_tolerance);
+      state.connected && state.motion && inSteadyCut(*condition_, state, parameters_.path_tolerance);
   if (on_path_since_ && (!on_path || gap)) {
     dropAfter(state.stamp - parameters_.guard_time, isCut());
     on_path_since_.reset();
   }
   if (!on_path) return;
   PathPoint point{state.stamp, {}};
+  if (feedTurns(*condition_)) {
+    if (!on_path_since_) on_path_since_ = state.stamp;
+    return;
+  }
   // onSteadyPath() has found all three.
   for (std::size_t a = 0; a < 3; ++a) point.position[a] = state.position[*controllerAxis(state.axes, a)];
   // The return to the start may run along the path, and the tool is at rest before the path.
@@ -93,11 +97,11 @@ bool SteadyRecord::isSteadyAt(double stamp) const {
 }
 
 void SteadyRecord::handle(const SampleBlock& block) {
-  if (isSteadyAt(block.stamp)) motor_.add(block);
+  if (isSteadyAt(block.stamp) && !feedTurns(*condition_)) motor_.add(block);
 }
 
 void SteadyRecord::handle(const ForceBlock& block) {
-  if (isSteadyAt(block.stamp)) force_.add(block);
+  if (isSteadyAt(block.stamp) && !feedTurns(*condition_)) force_.add(block);
 }
 
 SteadyRecord::Reading SteadyRecord::handle(const LoadSample& sample) {

@@ -33,16 +33,16 @@ bool isComplete(const std::vector<CuttingCondition>& tests) {
 
 // Whether air cuts at most as fast, and at least as fast, exist for every cut for which the plan has them:
 // friction is not extrapolated.
-bool enclosesCuts(const std::vector<CuttingCondition>& tests, const std::vector<CuttingCondition>& plan) {
+bool enclosesCuts(const std::vector<CuttingCondition>& selected, const std::vector<CuttingCondition>& plan) {
   const auto hasAir = [](const std::vector<CuttingCondition>& of, double speed, bool above) {
     return std::any_of(of.begin(), of.end(), [&](const CuttingCondition& t) {
       return !isCut(t) && (above ? t.spindle_speed >= speed : t.spindle_speed <= speed);
     });
   };
-  return std::all_of(tests.begin(), tests.end(), [&](const CuttingCondition& t) {
+  return std::all_of(selected.begin(), selected.end(), [&](const CuttingCondition& t) {
     const double speed = t.spindle_speed;
-    return !isCut(t) || ((hasAir(tests, speed, false) || !hasAir(plan, speed, false)) &&
-                         (hasAir(tests, speed, true) || !hasAir(plan, speed, true)));
+    return !isCut(t) || ((hasAir(selected, speed, false) || !hasAir(plan, speed, false)) &&
+                         (hasAir(selected, speed, true) || !hasAir(plan, speed, true)));
   });
 }
 

@@ -41,6 +41,12 @@ Residuals residualsOf(const Eigen::MatrixXd& design, const Eigen::VectorXd& valu
 
 }  // namespace
 
+double widening(double squares, double freedom) {
+  if (!(freedom >= 1.0) || squares <= boost::math::quantile(boost::math::chi_squared(freedom), SCATTER))
+    return 1.0;
+  return std::sqrt(squares / freedom);
+}
+
 WeightedFit fitWeighted(const Eigen::MatrixXd& design, const Eigen::VectorXd& value,
                         const Eigen::VectorXd& std_dev, double limit, const std::string& what) {
   WeightedFit fit;
@@ -53,11 +59,8 @@ WeightedFit fitWeighted(const Eigen::MatrixXd& design, const Eigen::VectorXd& va
     const Residuals residuals = residualsOf(design, value, weight, fit, limit);
     const std::size_t freedom = rows - fit.refused.size() - unknowns;
     if (residuals.worst.sigmas <= limit) {
-      const double n = static_cast<double>(freedom);
-      if (n > 0.0 && residuals.squares > boost::math::quantile(boost::math::chi_squared(n), SCATTER)) {
-        fit.widened = std::sqrt(residuals.squares / n);
-        fit.covariance *= residuals.squares / n;
-      }
+      fit.widened = widening(residuals.squares, static_cast<double>(freedom));
+      fit.covariance *= fit.widened * fit.widened;
       fit.weight.assign(weight.data(), weight.data() + weight.size());
       return fit;
     }

@@ -20,17 +20,29 @@ constexpr double LEAST_SINGULAR_VALUE = 1e-7;  // [1] smallest singular value ov
 constexpr double LARGEST_NULL_SPACE_SHARE =
     1e-3;  // [1] largest share of an observable coefficient in the null space
 
-// Torques and axis forces over their standard deviations; rows x coefficients in units of UNIT.
+constexpr Eigen::Index SIZE = 7;  // coefficients, and the gain of the forces in units of its error
+using Row = Eigen::Matrix<double, 1, SIZE>;
+using Square = Eigen::Matrix<double, SIZE, SIZE>;
+using Vector = Eigen::Matrix<double, SIZE, 1>;
+
+// Torques and axis forces over their standard deviations; rows x unknowns in units of UNIT.
 struct Observations {
-  std::vector<Eigen::Matrix<double, 1, 6>> rows;
+  explicit Observations(double error_of_gain) : gain_error(error_of_gain) {
+    if (gain_error == 0.0) return;
+    rows.emplace_back(Row::Unit(SIZE - 1));
+    targets.push_back(0.0);
+  }
+  double gain_error;
+  std::vector<Row> rows;
   std::vector<double> targets;
 
-  void add(const Eigen::Matrix<double, 1, 6>& row, const Estimate& e) {
+  void add(const Eigen::Matrix<double, 1, 6>& row, const Estimate& e, double gain_share) {
     if (!(e.std_dev > 0.0) || !std::isfinite(e.value)) {
       throw Error(
           "joint coefficients: expected measurements with a finite value and a standard deviation > 0");
     }
-    rows.push_back(row / e.std_dev);
+    rows.emplace_back();
+    rows.back() << row / e.std_dev, gain_share * e.value / e.std_dev;
     targets.push_back(e.value / e.std_dev);
   }
 
@@ -41,24 +53,23 @@ struct Observations {
       for (std::size_t c = 0; c < 6; ++c) row[f][static_cast<Eigen::Index>(c)] = map[f][c] * UNIT[c];
     }
     const Eigen::Matrix3d turn = feedFrame(r.tool, r.heading);
-    if (r.torque) add(row[3], *r.torque);
+    if (r.torque) add(row[3], *r.torque, 0.0);
     for (std::size_t a = 0; a < 3; ++a) {
       const auto i = static_cast<Eigen::Index>(a);
       if (r.axis_force[a])
-        add(turn(i, 0) * row[0] + turn(i, 1) * row[1] + turn(i, 2) * row[2], *r.axis_force[a]);
+        add(turn(i, 0) * row[0] + turn(i, 1) * row[1] + turn(i, 2) * row[2], *r.axis_force[a], gain_error);
     }
   }
 };
 
 struct JointFitResult {
-  Eigen::Matrix<double, 6, 1> found = Eigen::Matrix<double, 6, 1>::Zero();
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> null_space_share =
-      found;  // squared share of each coefficient in the null space
+  Vector found = Vector::Zero();
+  Square covariance = Square::Zero();
+  Vector null_space_share = found;  // squared share of each coefficient in the null space
 };
 
 JointFitResult solve(const Observations& all) {
-  Eigen::MatrixXd a(static_cast<Eigen::Index>(all.rows.size()), 6);
+  Eigen::MatrixXd a(static_cast<Eigen::Index>(all.rows.size()), SIZE);
   Eigen::VectorXd b(static_cast<Eigen::Index>(all.rows.size()));
   for (std::size_t i = 0; i < all.rows.size(); ++i) {
     a.row(static_cast<Eigen::Index>(i)) = all.rows[i];
@@ -69,7 +80,7 @@ JointFitResult solve(const Observations& all) {
   const Eigen::MatrixXd& v = svd.v;
   JointFitResult fit;
   Eigen::Index rank = 0;
-  for (Eigen::Index k = 0; k < 6; ++k) {
+  for (Eigen::Index k = 0; k < SIZE; ++k) {
     if (k < s.size() && s[k] > LEAST_SINGULAR_VALUE * s[0]) {
       fit.found += v.col(k) * (svd.u.col(k).dot(b) / s[k]);
       fit.covariance += v.col(k) * v.col(k).transpose() / (s[k] * s[k]);
@@ -86,10 +97,12 @@ JointFitResult solve(const Observations& all) {
 
 }  // namespace
 
-JointResult identifyJointly(const std::vector<JointMeasurement>& measurements) {
-  Observations all;
+JointResult identifyJointly(const std::vector<JointMeasurement>& measurements, double gain_error) {
+  Observations all(gain_error);
+  const std::size_t known = all.rows.size();
   for (const JointMeasurement& r : measurements) all.add(r);
-  if (all.rows.empty()) throw Error("joint coefficients: no measurement with a torque or a moving axis");
+  if (all.rows.size() == known)
+    throw Error("joint coefficients: no measurement with a torque or a moving axis");
   const JointFitResult fit = solve(all);
   JointResult result;
   result.value = result.std_dev = NOT_IDENTIFIED;

@@ -400,11 +400,17 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("air cuts", identification.airCuts().size());
   status.add("cuts", identification.cuts().size());
   if (const auto& production = identification.production()) {
+    status.add("production tool", identification.productionTool());
     status.addf("production Ktc [N/mm2]", "%.1f +- %.1f", production->ktc() / units::N_PER_MM2,
                 production->ktcStd() / units::N_PER_MM2);
     status.addf("production Kte [N/mm]", "%.2f +- %.2f", production->kte() / units::N_PER_MM,
                 production->kteStd() / units::N_PER_MM);
     status.addf("last cut's normalised innovation", "%.1f sigma", production->normalisedInnovation());
+    status.addf("scatter of the cuts over that stated", "%.1f", production->misfit());
+    if (!(production->ktc() > 0.0))
+      status.mergeSummaryf(Level::WARN,
+                           "production with %s: Ktc %.0f N/mm2, expected > 0; its cuts are not stored",
+                           identification.productionTool().c_str(), production->ktc() / units::N_PER_MM2);
   }
   const TemperatureWatch& temperature = identification.temperature();
   const std::string temperature_fault = temperature.fault(identification_.newest());

@@ -31,19 +31,36 @@ IdentifyResult identify(LoadMeterIdentification& identification, const IdentifyG
   return result;
 }
 
-/// Coverage over many sessions with slots at a speed. @param ktc_error, kte_error [1] largest error of a
-/// session
-void checkCoverage(double rpm, double ktc_error, double kte_error) {
-  Coverage ktc, kte;
-  for (int run = 0; run < Coverage::RUNS; ++run) {
-    Session session(static_cast<unsigned>(run + 1), 2e-4);
+/// Results of sessions with slots at a speed.
+std::vector<IdentifyResult> standardSessions(double rpm, unsigned runs) {
+  std::vector<IdentifyResult> results;
+  for (unsigned seed = 1; seed <= runs; ++seed) {
+    Session session(seed, 2e-4);
     session.ripple = session.any_angle = true;
     LoadMeterIdentification identification(model(), {});
     connect(session, identification);
     runStandardTests(session, rpm);
-    const IdentifyResult r = identify(identification, {session.now(), "endmill", "aluminium", false, 0});
+    results.push_back(identify(identification, {session.now(), "endmill", "aluminium", false, 0}));
+    EXPECT_EQ(identification.airCuts().size(), 3u);
+  }
+  return results;
+}
+
+constexpr double ANY_PHASE_RPM = 6100.0;  // the readings of a slot have all phases of the revolution
+
+/// Those at ANY_PHASE_RPM, for the tests that begin with them.
+const std::vector<IdentifyResult>& sessionsOfAnyPhase() {
+  static const std::vector<IdentifyResult> results = standardSessions(ANY_PHASE_RPM, Coverage::RUNS);
+  return results;
+}
+
+/// Coverage over sessions. @param factor of the deviations that is detected @param ktc_error, kte_error [1]
+/// largest error of a session
+void checkCoverage(const std::vector<IdentifyResult>& sessions, double factor, double ktc_error,
+                   double kte_error) {
+  Coverage ktc, kte;
+  for (const IdentifyResult& r : sessions) {
     ASSERT_EQ(r.code, IdentifyResult::Code::ok) << r.message;
-    ASSERT_EQ(identification.airCuts().size(), 3u);
     ASSERT_EQ(r.coefficients.tests, 3);
     const CoefficientSet& k = r.coefficients;
     EXPECT_NEAR(k.value.ktc, TRUTH.ktc, ktc_error * TRUTH.ktc);
@@ -55,21 +72,21 @@ void checkCoverage(double rpm, double ktc_error, double kte_error) {
     ktc.add(k.value.ktc - TRUTH.ktc, k.std_dev.ktc);
     kte.add(k.value.kte - TRUTH.kte, k.std_dev.kte);
   }
-  EXPECT_TRUE(ktc.isCalibrated()) << rpm;
-  EXPECT_TRUE(kte.isCalibrated()) << rpm;
+  EXPECT_TRUE(ktc.isCalibrated(0.0, factor));
+  EXPECT_TRUE(kte.isCalibrated(0.0, factor));
 }
 
 TEST(LoadMeterIdentification, findsTheTruthWithCalibratedStandardDeviations) {
   // Mean over some 180 readings of 0.22 mV on 0.1..0.3 V: far below one percent.
-  checkCoverage(6100.0, 0.01, 0.03);
+  checkCoverage(sessionsOfAnyPhase(), 1.5, 0.01, 0.03);
 }
 
 // At 100 revolutions per second each reading of a slot has the same phase of the ripple, of which the lag
 // leaves 1 / 43 at the 300 Hz of the teeth: a percent of the torque, which a mean over readings does not
 // remove and which three feeds amplify to some percent of Ktc and of the smaller Kte. The standard deviations
-// must cover it.
+// must cover it. The study loadmeter_cases has 200 machines.
 TEST(LoadMeterIdentification, aliasedReadingsIncreaseTheStandardDeviations) {
-  checkCoverage(6000.0, 0.05, 0.2);
+  checkCoverage(standardSessions(6000.0, Coverage::FEW), Coverage::FACTOR_OF_FEW, 0.05, 0.2);
 }
 
 // Readings every 20 ms without the spindle angle have three phases of a revolution at 4000 rpm, many at 4100.
@@ -114,25 +131,20 @@ TEST(LoadMeterIdentification, runoutIsEstimatedFromMeansAndRippleOfTheReadings) 
 TEST(LoadMeterIdentification, knowledgeOfAnEarlierSessionReplacesTests) {
   Coverage ktc, kte;
   for (int run = 0; run < Coverage::RUNS; ++run) {
-    const auto identifyWith = [&](unsigned seed, bool full, const std::optional<CoefficientRecord>& prior) {
-      Session session(seed, 2e-4);
+    const auto identifyWith = [&](const std::optional<CoefficientRecord>& prior) {
+      Session session(Coverage::RUNS + 1 + static_cast<unsigned>(run), 2e-4);
       session.ripple = session.any_angle = true;
       LoadMeterIdentification identification(model(), {});
       connect(session, identification);
-      if (full) {
-        runStandardTests(session, 6100.0);
-      } else {
-        for (const double rpm : {2000.0, 8000.0}) session.air(rpm, 2.0);
-        for (const double feed : {4e-5, 8e-5}) session.slot(6100.0, feed, 4.0);
-      }
+      for (const double rpm : {2000.0, 8000.0}) session.air(rpm, 2.0);
+      for (const double feed : {4e-5, 8e-5}) session.slot(ANY_PHASE_RPM, feed, 4.0);
       IdentifyGoal goal{session.now(), "endmill", "aluminium", false, 0};
       goal.prior = prior;
       return identify(identification, goal);
     };
-    const unsigned seed = 2 * static_cast<unsigned>(run) + 1;
-    const IdentifyResult first = identifyWith(seed, true, {});
+    const IdentifyResult& first = sessionsOfAnyPhase()[static_cast<std::size_t>(run)];
     ASSERT_EQ(first.code, IdentifyResult::Code::ok) << first.message;
-    const IdentifyResult both = identifyWith(seed + 1, false, first.record);
+    const IdentifyResult both = identifyWith(first.record);
     ASSERT_EQ(both.code, IdentifyResult::Code::ok) << both.message;
     if (both.coefficients.source == "load_meter") continue;  // one pair in a hundred disagrees by chance
     EXPECT_EQ(both.coefficients.source, "load_meter and database");
@@ -143,10 +155,10 @@ TEST(LoadMeterIdentification, knowledgeOfAnEarlierSessionReplacesTests) {
     ktc.add(both.coefficients.value.ktc - TRUTH.ktc, both.coefficients.std_dev.ktc);
     kte.add(both.coefficients.value.kte - TRUTH.kte, both.coefficients.std_dev.kte);
     if (run > 0) continue;
-    EXPECT_EQ(identifyWith(seed + 1, false, {}).code, IdentifyResult::Code::too_few_tests);
+    EXPECT_EQ(identifyWith({}).code, IdentifyResult::Code::too_few_tests);
     CoefficientRecord worn = first.record;
     worn.set.value.kte *= 1.5;
-    const IdentifyResult alone = identifyWith(seed + 1, false, worn);
+    const IdentifyResult alone = identifyWith(worn);
     EXPECT_EQ(alone.coefficients.source, "load_meter");
     EXPECT_EQ(alone.coefficients.value.ktc, alone.record.set.value.ktc);
     EXPECT_THAT(alone.message, HasSubstr("not used: the tests deviate by"));
@@ -345,9 +357,15 @@ TEST(Production, cutsOfASessionAreFollowedWithoutAGoal) {
   EXPECT_NEAR(k.ktc(), TRUTH.ktc, 4.0 * k.ktcStd());
   EXPECT_NEAR(k.kte(), TRUTH.kte, 4.0 * k.kteStd());
   EXPECT_LT(k.ktcStd(), 0.05 * TRUTH.ktc);
+  const std::string first = session.tool;
   session.tool = "another";
   session.slot(6000.0, 5e-5, 4.0);
   EXPECT_EQ(identification.production()->readings(), 1);
+  EXPECT_EQ(identification.productionTool(), "another");
+  // The first tool comes back from the magazine.
+  session.tool = first;
+  session.slot(6000.0, 5e-5, 4.0);
+  EXPECT_EQ(identification.production()->readings(), 4);
 }
 
 }  // namespace

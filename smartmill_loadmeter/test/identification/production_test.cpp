@@ -12,6 +12,7 @@
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/identification/production_run.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -100,6 +101,25 @@ TEST(Recursive, standardDeviationsAreCalibrated) {
   EXPECT_TRUE(kte.isCalibrated());
 }
 
+// The torques scatter by five times what they state, as with a load meter whose readings are late.
+TEST(Recursive, torquesThatContradictEachOtherIncreaseTheDeviations) {
+  Coverage ktc, kte;
+  for (int run = 0; run < Coverage::FEW; ++run) {
+    std::mt19937 random(static_cast<unsigned>(run) + 1);
+    RecursiveCoefficients recursive({}, 1e12);
+    for (int i = 0; i < 40; ++i) {
+      TorqueMeasurement one = reading(random, 953e6, 17.3e3, 0.05);
+      one.torque_std = 0.01;
+      recursive.update(one);
+    }
+    EXPECT_NEAR(recursive.misfit(), 5.0, 2.0);
+    ktc.add(recursive.ktc() - 953e6, recursive.ktcStd());
+    kte.add(recursive.kte() - 17.3e3, recursive.kteStd());
+  }
+  EXPECT_TRUE(ktc.isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
+  EXPECT_TRUE(kte.isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
+}
+
 // All torques are wrong by one draw of the common error: that of the friction, from a few air cuts.
 TEST(Recursive, aCommonErrorOfTheTorquesIsPartOfTheDeviations) {
   Coverage ktc, kte;
@@ -159,6 +179,85 @@ TEST(Recursive, oneFeedStaysBoundedAndAChippedEdgeIsDetected) {
   EXPECT_GT(recursive.normalisedInnovation(), 5.0);
   r.torque_std = 0.0;
   EXPECT_THAT(errorOf([&] { recursive.update(r); }), HasSubstr("standard deviation > 0"));
+}
+
+LoadTest cutWithTool(double duration) {
+  LoadTest cut;
+  cut.condition.tool_name = "end_mill";
+  cut.condition.tool = TOOL;
+  cut.duration = duration;
+  return cut;
+}
+
+// A torque that falls with the feed, as of loads and engagement that do not belong together.
+TEST(ProductionRun, givesNoRecordOfANegativeCoefficient) {
+  ProductionRun run(1800.0);
+  LoadTest cut = cutWithTool(1.0);
+  int records = 0;
+  for (const auto& [feed, torque] : {std::pair{3e-5, 1.0}, {9e-5, 0.2}, {3e-5, 1.0}, {9e-5, 0.2}}) {
+    cut.condition.engagement = {0.0, units::PI, 0.003, feed};
+    records += run.add(cut, Estimate{torque, 0.01}, 0.01).has_value();
+  }
+  ASSERT_LT(run.estimate()->ktc(), 0.0);
+  EXPECT_EQ(records, 1);  // the first cut alone says nothing of the slope
+}
+
+// Cuts of a pocket along x and y: half of them slots, half steps, at three feeds. The force sensor's gain is
+// wrong by one draw for all of them.
+TEST(ProductionRun, radialAndAxialCoefficientsFollowFromMeasuredForces) {
+  const CuttingCoefficients truth{953e6, 400e6, 150e6, 17.3e3, 15e3, 2e3};
+  constexpr double GAIN = 0.005, NOISE = 0.3, TORQUE_NOISE = 0.005;
+  Coverage krc, kre, kac;
+  for (int number = 0; number < Coverage::RUNS; ++number) {
+    std::mt19937 random(static_cast<unsigned>(number) + 1);
+    std::normal_distribution<double> normal;
+    const double gain = 1.0 + GAIN * normal(random);
+    ProductionRun run(1800.0);
+    std::optional<CoefficientRecord> last;
+    int cuts = 0;
+    for (int k = 0; k < 12; ++k) {
+      LoadTest cut = cutWithTool(2.0);
+      cut.condition.kind = CuttingCondition::Kind::cut;
+      cut.condition.engagement = {0.0, k % 2 == 0 ? units::PI : 1.2, 0.003, 4e-5 + 3e-5 * (k % 3)};
+      cut.condition.steady_to =
+          k % 4 < 2 ? std::array<double, 3>{{0.1, 0, 0}} : std::array<double, 3>{{0, -0.1, 0}};
+      const CuttingForce force = MechanisticForce(TOOL, truth, cut.condition.engagement).mean();
+      // Along the feed and across it, in the machine.
+      const double heading = k % 4 < 2 ? 0.0 : -0.5 * units::PI, c = std::cos(heading), s = std::sin(heading);
+      const std::array<double, 3> mean{{c * force.fx - s * force.fy, s * force.fx + c * force.fy, force.fz}};
+      MeanForce measured;
+      measured.gain_error = GAIN;
+      for (std::size_t a = 0; a < 3; ++a)
+        measured.axis[a] = Estimate{gain * mean[a] + NOISE * normal(random), NOISE};
+      last = run.add(cut, Estimate{force.torque + TORQUE_NOISE * normal(random), TORQUE_NOISE}, TORQUE_NOISE,
+                     measured);
+      ++cuts;
+    }
+    ASSERT_TRUE(last);
+    const double share = 1.0 / std::sqrt(static_cast<double>(cuts));
+    krc.add(last->set.value.krc - truth.krc, share * last->set.std_dev.krc);
+    kre.add(last->set.value.kre - truth.kre, share * last->set.std_dev.kre);
+    kac.add(last->set.value.kac - truth.kac, share * last->set.std_dev.kac);
+    EXPECT_NEAR(last->set.value.krc, truth.krc, 0.03 * truth.krc);
+    EXPECT_NEAR(last->covariance[CoefficientRecord::covarianceIndex(1, 1)],
+                std::pow(last->set.std_dev.krc, 2), 1e-6 * std::pow(last->set.std_dev.krc, 2));
+  }
+  // Scatter beyond the stated one widens the deviations of a third of the runs.
+  for (const Coverage* one : {&krc, &kre, &kac}) EXPECT_TRUE(one->isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
+}
+
+// The load meter alone, a cut along an arc: no radial coefficient.
+TEST(ProductionRun, withoutForcesThereAreNoRadialCoefficients) {
+  ProductionRun run(1800.0);
+  LoadTest cut = cutWithTool(1.0);
+  std::optional<CoefficientRecord> last;
+  for (const double feed : {3e-5, 9e-5}) {
+    cut.condition.engagement = {0.0, units::PI, 0.003, feed};
+    last = run.add(cut, Estimate{torqueOf(cut.condition.engagement, 953e6, 17.3e3), 0.01}, 0.01);
+  }
+  ASSERT_TRUE(last);
+  EXPECT_TRUE(std::isnan(last->set.value.krc));
+  EXPECT_TRUE(std::isfinite(last->set.value.ktc));
 }
 
 Spindle spindleOf() {

@@ -288,6 +288,17 @@ class Bench:
                     raise
                 time.sleep(0.1)
 
+    def start_first_node(self):
+        """Another program may take the port before the node has it."""
+        for attempts_left in (2, 1, 0):
+            try:
+                return self.start_node()
+            except OSError:
+                if self.node.poll() is None or attempts_left == 0:
+                    raise
+                self.port = free_port()
+                self.address = f"http://127.0.0.1:{self.port}/"
+
     def stop(self):
         processes = [p for p in [self.node, *self.others, self.core] if p]
         for process in processes:
@@ -846,7 +857,7 @@ def main():
     bench = Bench()
     try:
         machine = Machine()
-        bench.start_node()
+        bench.start_first_node()
         with Browser() as browser:
             browser.resize(*SIZES["1280x800"])
             browser.open(bench.address)

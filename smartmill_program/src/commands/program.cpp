@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,12 +15,15 @@
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/commands.h"
+#include "smartmill_program/nc/linuxcnc_program.h"
 #include "smartmill_program/nc/program_reader.h"
 #include "smartmill_program/plan/feed_planner.h"
 #include "smartmill_program/plan/plan_report.h"
 #include "smartmill_program/program_analysis.h"
 #include "smartmill_program/report/program_page.h"
 #include "smartmill_program/report/tables.h"
+#include "smartmill_program/stock/stock_shape.h"
+#include "smartmill_program/stock/triangle_mesh.h"
 
 namespace {
 
@@ -40,11 +44,11 @@ void requestStop(int) {
 }
 
 struct Arguments {
-  std::string program, out, colour = "force";
-  std::vector<double> stock_mm, corner_mm;
+  std::string program, out, stl, colour = "force";
+  std::vector<double> stock_mm, cylinder_mm, corner_mm;
   std::vector<std::string> models, work_offsets, radius_offsets;
   double resolution_mm = 0.1, step = SimulationOptions().step_share;
-  bool stability = true;
+  bool stability = true, linuxcnc = false;
   std::string plan;  // file; empty: no plan
   double most_force_n = FeedLimits::UNLIMITED, most_torque_nm = FeedLimits::UNLIMITED,
          most_power_w = FeedLimits::UNLIMITED, most_chip_mm = FeedLimits::UNLIMITED, least_chip_mm = 0.0,
@@ -77,7 +81,20 @@ void refuseToReplace(const Arguments& arguments) {
     throw Error("--plan " + arguments.plan + ": is the program itself, expected another file");
 }
 
-StockBlock blockOf(const Arguments& arguments) {
+/// @throws Error, UsageError
+StockShape stockOf(const Arguments& arguments) {
+  const int stated = !arguments.stock_mm.empty() + !arguments.cylinder_mm.empty() + !arguments.stl.empty();
+  if (stated != 1) throw UsageError("expected one of --stock-mm, --stock-cylinder-mm and --stock-stl");
+  if (!arguments.stl.empty())
+    return StockShape::mesh(std::make_shared<TriangleMesh>(readStl(arguments.stl, MM)));
+  if (!arguments.cylinder_mm.empty()) {
+    const double height = arguments.cylinder_mm[1] * MM;
+    const std::vector<double> centre = arguments.corner_mm.empty()
+                                           ? std::vector<double>{0.0, 0.0, -arguments.cylinder_mm[1]}
+                                           : arguments.corner_mm;
+    return StockShape::cylinder({centre[0] * MM, centre[1] * MM}, 0.5 * arguments.cylinder_mm[0] * MM,
+                                centre[2] * MM, centre[2] * MM + height);
+  }
   StockBlock block;
   for (std::size_t i = 0; i < 3; ++i) {
     const double size = arguments.stock_mm[i] * MM;
@@ -91,15 +108,16 @@ StockBlock blockOf(const Arguments& arguments) {
 ReaderOptions readerOptions(const Arguments& arguments, ToolModels& models) {
   ReaderOptions options;
   for (const std::string& text : arguments.work_offsets) {
-    int code = 0;
+    const std::size_t colon = text.find(':');
+    const std::string name = text.substr(0, colon);
     std::array<double, 3> offset{};
     char rest = 0;
-    if (std::sscanf(text.c_str(), "G%d:%lf:%lf:%lf%c", &code, &offset[0], &offset[1], &offset[2], &rest) !=
-            4 ||
-        code < 54 || code > 59)
-      throw Error("--work-offset " + text + ": expected G54:X:Y:Z to G59:X:Y:Z [mm]");
+    if (colon == std::string::npos || name.rfind("G5", 0) != 0 ||
+        std::sscanf(text.c_str() + colon, ":%lf:%lf:%lf%c", &offset[0], &offset[1], &offset[2], &rest) != 3)
+      throw Error("--work-offset " + text +
+                  ": expected G54:X:Y:Z to G59:X:Y:Z, G59.1:X:Y:Z or G54.1P1:X:Y:Z [mm]");
     for (double& value : offset) value *= MM;
-    if (!options.work_offsets.emplace(code - 54, offset).second)
+    if (!options.work_offsets.emplace(name, offset).second)
       throw Error("--work-offset " + text + ": stated a second time");
   }
   for (const std::string& text : arguments.radius_offsets) {
@@ -139,25 +157,11 @@ class ProgressLine {
   bool open_ = false;
 };
 
-/// @throws Error naming the first rapid move that meets the stock
-void refuseRapidHits(const std::string& program, const std::vector<BlockSummary>& blocks) {
-  const BlockSummary* first = nullptr;
-  std::size_t others = 0;
-  for (const BlockSummary& block : blocks) {
-    if (block.rapid_hit && first) ++others;
-    if (block.rapid_hit && !first) first = &block;
-  }
-  if (!first) return;
-  throw Error(program + ": line " + std::to_string(first->line) + ": " + first->operation +
-              ": a rapid move hits the stock" +
-              (others > 0 ? " (and in " + std::to_string(others) + " more blocks, see blocks.csv)" : ""));
-}
-
 /// Plans the feeds, after the analysis of the program. @return exit code
 int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& planner,
               const std::vector<Move>& moves, const AnalysisResult& before, const AnalysisOptions& options) {
   ProgressLine progress;
-  const Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
+  const Stock stock(stockOf(arguments), arguments.resolution_mm * MM);
   const FeedPlan plan =
       planner.plan(moves, before, stock, options, [&](double share) { return progress(share); });
   progress.close();
@@ -173,7 +177,6 @@ int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& 
 }
 
 int run(const Arguments& arguments) {
-  const Colour colour = colourOf(arguments.colour);
   ToolModels models(arguments.models);
   const ReaderOptions reader = readerOptions(arguments, models);
   const std::string text = readText(arguments.program);
@@ -182,8 +185,9 @@ int run(const Arguments& arguments) {
     refuseToReplace(arguments);
     planner.emplace(arguments.program, text, reader, models, limitsOf(arguments, models));
   }
-  const std::vector<Move> moves = interpretProgram(text, arguments.program, reader);
-  Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
+  const std::vector<Move> moves = arguments.linuxcnc ? interpretWithLinuxcnc(text, arguments.program, reader)
+                                                     : interpretProgram(text, arguments.program, reader);
+  Stock stock(stockOf(arguments), arguments.resolution_mm * MM);
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);
   if (failed) throw Error(arguments.out + ": " + failed.message());
@@ -194,14 +198,14 @@ int run(const Arguments& arguments) {
   options.stability = arguments.stability;
   ProgramAnalysis analysis(arguments.program, models, stock, options);
   StepTable steps;
-  PathPicture picture(stock.block(), colour);
+  PathView path(stock.block(), arguments.colour);
   ProgressLine progress;
   std::signal(SIGINT, requestStop);
   const AnalysisResult result = analysis.run(
       moves,
       [&](const Step& step, const StepPrediction& prediction) {
-        steps.add(step, prediction, models.radius(step.move->tool));
-        picture.add(step, prediction);
+        steps.add(step, prediction);
+        path.add(step, prediction);
         if (planner) planner->add(step);
       },
       [&](double share) { return progress(share); });
@@ -211,7 +215,7 @@ int run(const Arguments& arguments) {
   const std::string summary = summaryOf(result.blocks);
   blockTable(result.blocks).save(arguments.out + "/blocks.csv");
   steps.csv().save(arguments.out + "/steps.csv");
-  programPage(std::filesystem::path(arguments.program).filename().string(), summary, picture, result.blocks)
+  programPage(std::filesystem::path(arguments.program).filename().string(), summary, path, result.blocks)
       .write(arguments.out + "/report.html");
   std::cout << summary;
   std::fprintf(stderr, "%zu steps and %zu stability limits in %.2f s, %.0f x real time\n", result.steps,
@@ -221,7 +225,8 @@ int run(const Arguments& arguments) {
                  result.blocks.empty() ? 0 : result.blocks.back().line, arguments.out.c_str());
     return INTERRUPTED;
   }
-  refuseRapidHits(arguments.program, result.blocks);
+  if (const std::string collision = collisionText(arguments.program, result.blocks); !collision.empty())
+    throw Error(collision);
   return planner ? writePlan(arguments, text, *planner, moves, result, options) : 0;
 }
 
@@ -253,11 +258,16 @@ Command programCommand() {
   command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the files contain the blocks until then"}};
   command.setBody(run, [](CommandLine& line, Arguments& arguments) {
     line.option("PROGRAM", arguments.program, "NC program").required();
-    line.option("--stock-mm", arguments.stock_mm, "size of the stock in X, Y and Z [mm]")
-        .count(3, 3)
-        .required();
+    line.option("--stock-mm", arguments.stock_mm, "size of the stock in X, Y and Z [mm]").count(3, 3);
+    line.option("--stock-cylinder-mm", arguments.cylinder_mm,
+                "diameter and height of a cylinder about Z [mm]")
+        .count(2, 2);
+    line.option("--stock-stl", arguments.stl,
+                "STL file of the stock, in mm and in the coordinates of the program");
     line.option("--corner-mm", arguments.corner_mm,
-                "its corner of least X, Y and Z [mm] (default: 0 0 and minus the size in Z)")
+                "corner of least X, Y and Z of a block, or middle of the lower face of a cylinder [mm] "
+                "(default: 0 0 "
+                "and minus the size in Z)")
         .count(3, 3);
     line.option("--model", arguments.models,
                 "machine model file with tool, coefficients and modes; N=FILE for tool N of several")
@@ -271,8 +281,10 @@ Command programCommand() {
         .within(0.001, 1.0)
         .showDefault();
     line.option("--work-offset", arguments.work_offsets,
-                "G54:X:Y:Z ... G59:X:Y:Z [mm] zero of a work offset in the coordinates of the stock")
-        .count(1, 6);
+                "G54:X:Y:Z ... G59:X:Y:Z, G59.1:X:Y:Z, G54.1P1:X:Y:Z [mm] zero of a work offset in the "
+                "coordinates of the "
+                "stock")
+        .count(1, 309);
     line.option("--radius-offset", arguments.radius_offsets,
                 "D1=RADIUS [mm] radius offset of G41 and G42 (default: radius of the tool)")
         .count(1, 999);
@@ -283,6 +295,9 @@ Command programCommand() {
     const auto plan =
         line.option("--plan", arguments.plan,
                     "writes the program with feeds that hold the following limits to this file");
+    line.flag("--linuxcnc", arguments.linuxcnc,
+              "reads the program with LinuxCNC's own interpreter (rs274): O words, named parameters")
+        .excludes(plan);
     const auto limit = [&](const char* name, double& value, const char* help) {
       line.option(name, value, help).positive().needs(plan);
     };

@@ -16,8 +16,44 @@ constexpr double LEVEL = 1.0 - 1e-9;  // [1] horizontal share of a feed without 
 
 bool isSteadyCut(const Step& step) {
   const Move& move = *step.move;
-  return !move.rapid && !move.left_hand && !move.path.isArc() && step.feed_share >= LEVEL &&
-         step.contact.arcs.size() == 1;
+  return !move.rapid && !move.left_hand && step.feed_share >= LEVEL && !step.contact.empty() &&
+         (!move.path.isArc() || move.path.plane() == nc::Plane::xy);
+}
+
+/// Whether the engagement changes over the height.
+bool isBanded(const Contact& contact) {
+  return contact.arcs.size() != 1 || contact.arcs.front().bottom != 0.0;
+}
+
+/// Of a contact with bands, without feed.
+Engagement bandedEngagement(const Contact& contact) {
+  Engagement engagement{contact.entry(), contact.exit(), contact.axialDepth(), 0.0};
+  for (const EngagedArc& arc : contact.arcs)
+    engagement.bands.push_back({arc.entry, arc.exit, arc.bottom, arc.top});
+  return engagement;
+}
+
+/// [m] Integrals over the height that the torque of chip and edges is in proportion to.
+double chipOf(const Contact& contact) {
+  double sum = 0.0;
+  for (const EngagedArc& arc : contact.arcs) sum += arc.depth() * (std::cos(arc.entry) - std::cos(arc.exit));
+  return sum;
+}
+double edgeOf(const Contact& contact) {
+  double sum = 0.0;
+  for (const EngagedArc& arc : contact.arcs) sum += arc.depth() * (arc.exit - arc.entry);
+  return sum;
+}
+
+/// Whether a move continues another along the same circle: programs divide circles.
+bool continuesCircle(const Move& before, const Move& move) {
+  constexpr double ROUNDING = 2e-6;  // [m] of centres by I and J or R with three decimals
+  if (!before.path.isArc() || !move.path.isArc() || before.tool != move.tool || before.feed != move.feed ||
+      before.spindle_speed != move.spindle_speed || before.path.sweep() * move.path.sweep() < 0.0)
+    return false;
+  return std::abs(before.path.radius() - move.path.radius()) <= ROUNDING &&
+         std::hypot(before.path.centre()[0] - move.path.centre()[0],
+                    before.path.centre()[1] - move.path.centre()[1]) <= ROUNDING;
 }
 
 struct Bounds {
@@ -52,6 +88,7 @@ class StretchFinder {
     in_contact_ = contact;
     if (!cut && !air) return;
     if (!run_) start(move, cut, begin);
+    run_->last_move = move;
     run_->stretch.end = end;
     run_->stretch.time += step.time;
     run_->last_feed = step.move->rapid ? 0.0 : step.move->feed;
@@ -69,9 +106,11 @@ class StretchFinder {
  private:
   struct Run {
     SteadyStretch stretch;
+    std::size_t last_move = 0;
     double last_feed = 0.0;    // [m/s] 0: rapid
     double step_length = 0.0;  // [m]
-    std::optional<Bounds> entry, exit, depth;
+    std::optional<Bounds> entry, exit, depth, chip, edge;
+    std::vector<Engagement> banded;  // of each step of a cut with bands; empty: without
   };
   const std::vector<Move>& moves() const { return program_.path.moves(); }
 
@@ -79,7 +118,7 @@ class StretchFinder {
   void dwellBefore(std::size_t move) {
     for (std::size_t m = move_; m < move; ++m) {
       const Move& resting = moves()[m];
-      if (run_ && !continuesAir(resting)) close(false);
+      if (run_ && (run_->stretch.cut ? resting.dwell > 0.0 : !continuesAir(resting))) close(false);
       if (resting.dwell == 0.0 || resting.spindle_speed == 0.0 || in_contact_) continue;
       const double place = program_.path.begin(m + 1);
       if (!run_) start(m, false, place);
@@ -98,11 +137,19 @@ class StretchFinder {
   }
 
   bool continuesCut(const Step& step) const {
-    if (!run_->stretch.cut || run_->stretch.move != move_) return false;
-    return run_->entry->rangeWith(step.contact.entry()) <= parameters_.angle_tolerance &&
-           run_->exit->rangeWith(step.contact.exit()) <= parameters_.angle_tolerance &&
-           run_->depth->rangeWith(step.contact.axialDepth()) <=
-               parameters_.depth_tolerance * step.contact.axialDepth();
+    if (!run_->stretch.cut) return false;
+    if (run_->last_move != move_ &&
+        (run_->last_move + 1 != move_ || !continuesCircle(moves()[run_->last_move], moves()[move_])))
+      return false;
+    const Contact& contact = step.contact;
+    const double depth_tolerance = parameters_.depth_tolerance;
+    const bool banded = isBanded(contact);
+    if (banded == run_->banded.empty()) return false;
+    return run_->entry->rangeWith(contact.entry()) <= parameters_.angle_tolerance &&
+           run_->exit->rangeWith(contact.exit()) <= parameters_.angle_tolerance &&
+           run_->depth->rangeWith(contact.axialDepth()) <= depth_tolerance * contact.axialDepth() &&
+           (!banded || (run_->chip->rangeWith(chipOf(contact)) <= depth_tolerance * chipOf(contact) &&
+                        run_->edge->rangeWith(edgeOf(contact)) <= depth_tolerance * edgeOf(contact)));
   }
   bool continuesAir(const Move& move) const {
     return !run_->stretch.cut && move.tool == run_->stretch.tool &&
@@ -113,6 +160,7 @@ class StretchFinder {
     run_ = Run();
     SteadyStretch& stretch = run_->stretch;
     stretch.cut = cut;
+    stretch.turns = cut && moves()[move].path.isArc();
     stretch.begin = begin;
     stretch.move = move;
     stretch.tool = moves()[move].tool;
@@ -130,6 +178,9 @@ class StretchFinder {
     extend(run_->entry, step.contact.entry());
     extend(run_->exit, step.contact.exit());
     extend(run_->depth, step.contact.axialDepth());
+    extend(run_->chip, chipOf(step.contact));
+    extend(run_->edge, edgeOf(step.contact));
+    if (isBanded(step.contact)) run_->banded.push_back(bandedEngagement(step.contact));
     run_->step_length = step.length;
     sum_.entry += step.length * step.contact.entry();
     sum_.exit += step.length * step.contact.exit();
@@ -145,16 +196,19 @@ class StretchFinder {
     const double margin = std::max(parameters_.margin_time, revolution);
     if (stretch.cut) {
       const double length = stretch.end - stretch.begin;
-      stretch.engagement = {sum_.entry / length, sum_.exit / length, sum_.axial_depth / length,
-                            stretch.feed * revolution / stretch.geometry.teeth};
+      if (run.banded.empty()) {
+        stretch.engagement = {sum_.entry / length, sum_.exit / length, sum_.axial_depth / length, 0.0};
+      } else {
+        stretch.engagement = run.banded[run.banded.size() / 2];
+      }
+      stretch.engagement.feed_per_tooth = stretch.feed * revolution / stretch.geometry.teeth;
       // The engagement is that of the middle of a step.
       const double way = std::max(stretch.feed * margin, run.step_length);
       stretch.steady_from = stretch.begin + way;
       stretch.steady_to = stretch.end - way;
       if (!(stretch.steady_to > stretch.steady_from)) return;
-      const double begin = program_.path.begin(stretch.move);
-      stretch.from = moves()[stretch.move].path.at(stretch.steady_from - begin);
-      stretch.to = moves()[stretch.move].path.at(stretch.steady_to - begin);
+      stretch.from = program_.path.at(stretch.steady_from);
+      stretch.to = program_.path.at(stretch.steady_to);
     } else {
       stretch.steady_from = stretch.begin;
       stretch.steady_to = std::max(stretch.begin, stretch.end - (contact ? run.last_feed * margin : 0.0));
@@ -173,15 +227,6 @@ class StretchFinder {
   Engagement sum_;                             // over the steps of a cut, times length
   std::map<std::pair<bool, int>, int> parts_;  // by kind and line
 };
-
-void refuseRapidHits(const std::string& name, const std::vector<BlockSummary>& blocks) {
-  const auto hit =
-      std::find_if(blocks.begin(), blocks.end(), [](const BlockSummary& block) { return block.rapid_hit; });
-  if (hit != blocks.end())
-    throw Error(name + ": line " + std::to_string(hit->line) + ": " + hit->operation +
-                ": a rapid move hits the stock, expected the stock's size and corner in the program's "
-                "coordinates");
-}
 
 }  // namespace
 
@@ -210,7 +255,8 @@ LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, Too
       });
   finder.finish();
   program.pieces = pieces.take();
-  refuseRapidHits(name, result.blocks);
+  if (const std::string collision = collisionText(name, result.blocks); !collision.empty())
+    throw Error(collision + ", expected the stock's size and corner in the program's coordinates");
   return program;
 }
 

@@ -300,7 +300,7 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
                    (stretch.part > 1 ? formatted(" stretch %d", stretch.part) : "") +
                    (count > 1 ? formatted(" (%d)", count) : "");
   condition.material = names_.material;
-  condition.tool_name = names_.tool + (several_tools_ ? formatted(" T%d", stretch.tool) : "");
+  condition.tool_name = toolName(names_.tool, stretch.tool, several_tools_);
   condition.tool = stretch.geometry;
   condition.cut_time_before = cut_time_[stretch.tool];
   condition.spindle_speed = active.speed;
@@ -309,7 +309,7 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
   condition.engagement.feed_per_tooth = active.feed * units::TWO_PI / (active.speed * stretch.geometry.teeth);
   for (std::size_t a = 0; a < 3; ++a) {
     condition.steady_from[a] = stretch.from[a] + zero_[a];
-    condition.steady_to[a] = stretch.to[a] + zero_[a];
+    condition.steady_to[a] = stretch.turns ? NOT_A_NUMBER : stretch.to[a] + zero_[a];
   }
   return condition;
 }

@@ -17,10 +17,10 @@ constexpr double ROUNDING = 1e-9;  // [m] of a place
 bool alike(const Contact& a, const Contact& b, const PieceTolerance& tolerance) {
   return a.arcs.size() == b.arcs.size() &&
          std::equal(a.arcs.begin(), a.arcs.end(), b.arcs.begin(),
-                    [&](const ContactArc& one, const ContactArc& other) {
+                    [&](const EngagedArc& one, const EngagedArc& other) {
                       return std::abs(one.entry - other.entry) <= tolerance.angle &&
                              std::abs(one.exit - other.exit) <= tolerance.angle &&
-                             std::abs(one.depth - other.depth) <= tolerance.depth * one.depth;
+                             std::abs(one.top - other.top) <= tolerance.depth * one.depth();
                     });
 }
 

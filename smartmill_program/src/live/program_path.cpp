@@ -54,6 +54,11 @@ std::size_t ProgramPath::firstMove(double from) const {
          1;
 }
 
+Point ProgramPath::at(double place) const {
+  const std::size_t move = std::min(firstMove(place), moves_.size() - 1);
+  return moves_[move].path.at(std::clamp(place - begin_[move], 0.0, moves_[move].path.length()));
+}
+
 bool ProgramPath::hasSequence(int sequence, double from, double to) const {
   for (std::size_t m = firstMove(from); m < moves_.size() && begin_[m] <= to; ++m)
     if (moves_[m].sequence == sequence) return true;

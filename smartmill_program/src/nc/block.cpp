@@ -1,5 +1,6 @@
 #include "block.h"
 
+#include <cmath>
 #include <string_view>
 
 #include "smartmill_core/error.h"
@@ -16,18 +17,25 @@ struct Code {
   Group group;
 };
 constexpr Code CODES[] = {
-    {0, Group::motion},  {1, Group::motion},  {2, Group::motion},    {3, Group::motion},
-    {80, Group::cycle},  {81, Group::cycle},  {82, Group::cycle},    {83, Group::cycle},
-    {17, Group::plane},  {18, Group::plane},  {19, Group::plane},    {20, Group::units},
-    {21, Group::units},  {40, Group::cutter}, {41, Group::cutter},   {42, Group::cutter},
-    {43, Group::length}, {49, Group::length}, {54, Group::work},     {55, Group::work},
-    {56, Group::work},   {57, Group::work},   {58, Group::work},     {59, Group::work},
-    {61, Group::path},   {64, Group::path},   {90, Group::distance}, {91, Group::distance},
-    {94, Group::feed},   {95, Group::feed},   {98, Group::retract},  {99, Group::retract},
-    {4, Group::none},    {28, Group::none},   {53, Group::none}};
+    {0, Group::motion},   {1, Group::motion},    {2, Group::motion},    {3, Group::motion},
+    {80, Group::cycle},   {81, Group::cycle},    {82, Group::cycle},    {83, Group::cycle},
+    {17, Group::plane},   {18, Group::plane},    {19, Group::plane},    {20, Group::units},
+    {21, Group::units},   {40, Group::cutter},   {41, Group::cutter},   {42, Group::cutter},
+    {43, Group::length},  {49, Group::length},   {54, Group::work},     {55, Group::work},
+    {56, Group::work},    {57, Group::work},     {58, Group::work},     {59, Group::work},
+    {61, Group::path},    {64, Group::path},     {90, Group::distance}, {91, Group::distance},
+    {93, Group::feed},    {94, Group::feed},     {95, Group::feed},     {98, Group::retract},
+    {99, Group::retract}, {4, Group::none},      {28, Group::none},     {52, Group::none},
+    {53, Group::none},    {68, Group::rotation}, {69, Group::rotation}, {73, Group::cycle},
+    {74, Group::cycle},   {76, Group::cycle},    {84, Group::cycle},    {85, Group::cycle},
+    {86, Group::cycle},   {87, Group::cycle},    {88, Group::cycle},    {89, Group::cycle}};
+constexpr double FRACTIONS[] = {54.1, 59.1, 59.2, 59.3};  // work offsets
 constexpr int FUNCTIONS[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 98, 99};
 
-std::optional<Group> groupOf(int code) {
+std::optional<Group> groupOf(const Word& word) {
+  for (const double fraction : FRACTIONS)
+    if (std::abs(*word.value - fraction) < 1e-9) return Group::work;
+  const int code = nc::integer(word, MAX_CODE);
   for (const Code& known : CODES)
     if (known.code == code) return known.group;
   return std::nullopt;
@@ -58,7 +66,7 @@ Block::Block(const std::string& line, const nc::Variables& variables) {
 
 void Block::add(const Word& word) {
   if (word.address == 'G') {
-    const std::optional<Group> group = groupOf(nc::integer(word, MAX_CODE));
+    const std::optional<Group> group = groupOf(word);
     if (!group) refuse(word, "unknown word " + word.text());
     std::optional<Word>& place = codes_[static_cast<std::size_t>(*group)];
     if (place) refuse(word, word.text() + " and " + place->text() + " in one block");

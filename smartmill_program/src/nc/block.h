@@ -13,7 +13,7 @@ namespace smartmill::program {
 
 /// Modal groups of G codes; at most one code of each in a block.
 enum class Group {
-  none,  // G4, G28, G53
+  none,  // G4, G28, G52, G53
   motion,
   cycle,
   plane,
@@ -25,6 +25,7 @@ enum class Group {
   work,
   retract,
   path,
+  rotation,
   count
 };
 

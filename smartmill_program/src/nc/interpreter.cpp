@@ -22,7 +22,8 @@ constexpr std::size_t MAX_MOVES = 5000000;  // 1.3 GB; a program that cuts for d
 constexpr int MAX_TOOL = 9999;
 constexpr int MAX_OFFSET = 999;  // D
 constexpr double MAX_PECKS = 9999;
-constexpr int MAX_HOLES = 9999;  // K or L
+constexpr int MAX_HOLES = 9999;       // K or L
+constexpr int MAX_WORK_OFFSET = 300;  // P of G54.1
 
 int codeOf(const Word& word) {
   return static_cast<int>(*word.value);
@@ -40,8 +41,12 @@ void Interpreter::execute(Block& block, std::size_t number, int line) {
   const std::optional<Word>& single = block.code(Group::none);
   if (single && codeOf(*single) == 4) {
     dwell(block, *single);
+  } else if (single && codeOf(*single) == 52) {
+    setLocalOffset(block, *single);
   } else if (single) {
     reference(block, *single, codeOf(*single) == 28);
+  } else if (const auto& turn = block.code(Group::rotation); turn && codeOf(*turn) == 68) {
+    // X and Y are the centre.
   } else if (hasAxes(block) || block.has('I') || block.has('J') || block.has('K')) {
     motion(block);
   }
@@ -63,15 +68,18 @@ void Interpreter::fail(const std::string& message) const {
 
 void Interpreter::setModes(Block& block) {
   if (const auto& word = block.code(Group::feed)) {
-    const bool per_revolution = codeOf(*word) == 95;
-    if (per_revolution != per_revolution_) feed_.reset();
-    per_revolution_ = per_revolution;
+    const FeedMode mode = codeOf(*word) == 93   ? FeedMode::inverse_time
+                          : codeOf(*word) == 94 ? FeedMode::per_minute
+                                                : FeedMode::per_revolution;
+    if (mode != feed_mode_) feed_.reset();
+    feed_mode_ = mode;
   }
+  if (feed_mode_ == FeedMode::inverse_time) feed_.reset();  // of its block only
   if (const auto& word = block.code(Group::units)) setUnits(*word);
   if (const Word* word = block.take('F')) {
     if (!(*word->value > 0.0)) refuse(*word, word->text() + ", expected a feed above 0");
-    feed_ = length(*word->value);
-    feed_word_ = {*word->value, 0.0, per_revolution_, line_, number_};
+    feed_ = feed_mode_ == FeedMode::inverse_time ? *word->value : length(*word->value);
+    feed_word_ = {*word->value, 0.0, feed_mode_, line_, number_};
   }
   if (const Word* word = block.take('S')) {
     if (*word->value < 0.0) refuse(*word, word->text() + ", expected a speed of 0 or more");
@@ -90,7 +98,8 @@ void Interpreter::setModes(Block& block) {
     block.take('P');
     block.take('Q');
   }
-  if (const auto& word = block.code(Group::work)) setWorkOffset(*word);
+  if (const auto& word = block.code(Group::work)) setWorkOffset(block, *word);
+  if (const auto& word = block.code(Group::rotation)) setRotation(block, *word);
   if (const auto& word = block.code(Group::distance)) relative_ = codeOf(*word) == 91;
   if (const auto& word = block.code(Group::retract)) to_retract_plane_ = codeOf(*word) == 99;
   motion_word_.reset();
@@ -114,16 +123,82 @@ void Interpreter::setUnits(const Word& word) {
   unit_ = unit;
 }
 
-void Interpreter::setWorkOffset(const Word& word) {
-  const int work = codeOf(word) - 54;
+void Interpreter::setWorkOffset(Block& block, const Word& word) {
+  std::string work = formatted("G%g", *word.value);
+  if (work == "G54.1") {
+    const Word* number = block.take('P');
+    if (!number) refuse(word, "G54.1 without P, expected the number of a work offset");
+    work += "P" + std::to_string(nc::integer(*number, MAX_WORK_OFFSET));
+  }
   if (work_ == work) return;
+  if (rotation_ != 0.0) refuse(word, work + " under G68, expected G69 before it");
   const auto stated = options_.work_offsets.find(work);
   if (stated == options_.work_offsets.end() && work_)
-    refuse(word, word.text() + " after G" + std::to_string(*work_ + 54) +
-                     ": its offset is unknown, expected --work-offset " + word.text() + ":X:Y:Z");
-  const Point offset = stated == options_.work_offsets.end() ? Point{{0, 0, 0}} : stated->second;
+    refuse(word,
+           work + " after " + *work_ + ": its offset is unknown, expected --work-offset " + work + ":X:Y:Z");
+  offset_ = stated == options_.work_offsets.end() ? Point{{0, 0, 0}} : stated->second;
+  for (std::size_t i = 0; i < 3; ++i) offset_[i] += local_[i];
   work_ = work;
-  offset_ = offset;
+}
+
+// A further shift of all work offsets, by the stated axes.
+void Interpreter::setLocalOffset(Block& block, const Word& code) {
+  if (rotation_ != 0.0) refuse(code, "G52 under G68, expected G69 before it");
+  if (compensation_.active()) refuse(code, "G52 under radius compensation, expected G40 before it");
+  if (!hasAxes(block)) refuse(code, "G52 without X, Y or Z");
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Word* word = block.take(static_cast<char>('X' + i));
+    if (!word) continue;
+    const double local = length(*word->value);
+    offset_[i] += local - local_[i];
+    local_[i] = local;
+  }
+}
+
+// G68 X Y R: the program's coordinates are turned counterclockwise about a point; G69: no longer.
+void Interpreter::setRotation(Block& block, const Word& code) {
+  const bool ends = codeOf(code) == 69;
+  if (compensation_.active())
+    refuse(code, code.text() + " under radius compensation, expected G40 before it");
+  if (!ends && plane_ != nc::Plane::xy) refuse(code, "G68 in G18 or G19, expected G17");
+  const auto turn = [this](double angle) {  // the present position
+    if (!position_[0] || !position_[1]) {
+      position_[0].reset();
+      position_[1].reset();
+      return;
+    }
+    const double x = *position_[0] - about_[0], y = *position_[1] - about_[1];
+    position_[0] = about_[0] + std::cos(angle) * x - std::sin(angle) * y;
+    position_[1] = about_[1] + std::sin(angle) * x + std::cos(angle) * y;
+  };
+  if (rotation_ != 0.0) turn(rotation_);
+  rotation_ = 0.0;
+  if (ends) return;
+  const Word* angle = block.take('R');
+  if (!angle) refuse(code, "G68 without R, expected the angle in degrees");
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Word* word = block.take(static_cast<char>('X' + i));
+    if (!word && !position_[i]) refuse(code, "G68 about an unknown position, expected X and Y");
+    about_[i] = word ? length(*word->value) + offset_[i] : *position_[i];
+  }
+  rotation_ = units::radFromDeg(*angle->value);
+  turn(-rotation_);
+}
+
+PathSegment Interpreter::rotated(const PathSegment& path) const {
+  if (rotation_ == 0.0) return path;
+  const auto turned = [this](const std::array<double, 2>& p) {
+    const double x = p[0] - about_[0], y = p[1] - about_[1], c = std::cos(rotation_), s = std::sin(rotation_);
+    return std::array<double, 2>{about_[0] + c * x - s * y, about_[1] + s * x + c * y};
+  };
+  const auto point = [&](const Point& p) {
+    const std::array<double, 2> q = turned({p[0], p[1]});
+    return Point{q[0], q[1], p[2]};
+  };
+  if (!path.isArc()) return PathSegment::line(point(path.start()), point(path.target()));
+  if (path.plane() != nc::Plane::xy) fail(operation_ + " in G18 or G19 under G68, expected G17");
+  return PathSegment::arc(point(path.start()), point(path.target()), turned(path.centre()),
+                          path.sweep() < 0.0);
 }
 
 void Interpreter::setTool(Block& block) {
@@ -191,6 +266,8 @@ void Interpreter::dwell(Block& block, const Word& code) {
 // G28 by way of a point to the reference position, G53 in machine coordinates: the place of both in the
 // coordinates of the stock is not part of a program.
 void Interpreter::reference(Block& block, const Word& code, bool by_way) {
+  if (rotation_ != 0.0 && (block.has('X') || block.has('Y') || !hasAxes(block)))
+    refuse(code, code.text() + " of X or Y under G68, expected G69 before it");
   std::array<bool, 3> moved{block.has('X'), block.has('Y'), block.has('Z')};
   if (!hasAxes(block)) {
     if (!by_way) refuse(code, "G53 without X, Y or Z");
@@ -238,11 +315,14 @@ Interpreter::Point Interpreter::known(const Position& position, const std::strin
   return point;
 }
 
-double Interpreter::feed(const std::string& operation) const {
+double Interpreter::feed(const std::string& operation, double path_length) const {
+  if (!feed_ && feed_mode_ == FeedMode::inverse_time)
+    fail(operation + " without a feed, expected F in each block of G93");
   if (!feed_)
-    fail(operation + " without a feed, expected F" + (per_revolution_ ? " in G95" : "") +
-         " in or before this block");
-  if (!per_revolution_) return *feed_ / 60.0;
+    fail(operation + " without a feed, expected F" +
+         (feed_mode_ == FeedMode::per_revolution ? " in G95" : "") + " in or before this block");
+  if (feed_mode_ == FeedMode::inverse_time) return *feed_ * path_length / 60.0;
+  if (feed_mode_ == FeedMode::per_minute) return *feed_ / 60.0;
   if (!(speed_ > 0.0)) fail(operation + " in G95 without a speed, expected S");
   return *feed_ * speed_ / units::TWO_PI;
 }
@@ -254,7 +334,7 @@ void Interpreter::add(const PathSegment& path, bool rapid, double feed, double d
   move.line = line_;
   move.sequence = sequence_;
   move.operation = operation_;
-  move.path = path;
+  move.path = rotated(path);
   move.rapid = rapid;
   move.feed = feed;
   if (feed > 0.0) {
@@ -278,7 +358,7 @@ void Interpreter::motion(Block& block) {
   if (motion_ == -1 || motion_ == 80)
     fail(std::string("axis words without a motion") + (motion_ == 80 ? " after G80" : "") +
          ", expected G0, G1, G2 or G3");
-  if (motion_ > 80) {
+  if (motion_ > 70) {
     cycle(block);
     return;
   }
@@ -286,9 +366,10 @@ void Interpreter::motion(Block& block) {
   if (motion_ >= 2) {
     arc(block, to);
   } else if (motion_ == 1) {
-    const double speed = feed(operation_);
     const Point start = known(position_, operation_), end = known(to, operation_);
-    if (start != end) add(PathSegment::line(start, end), false, speed);
+    const PathSegment path = PathSegment::line(start, end);
+    const double speed = feed(operation_, path.length());
+    if (start != end) add(path, false, speed);
   } else {
     bool whole = true;
     for (std::size_t i = 0; i < 3; ++i) whole = whole && position_[i] && to[i];
@@ -298,7 +379,6 @@ void Interpreter::motion(Block& block) {
 }
 
 void Interpreter::arc(Block& block, const Position& to) {
-  const double speed = feed(operation_);
   const Point start = known(position_, operation_), end = known(to, operation_);
   const bool clockwise = motion_ == 2;
   const Word* radius = block.take('R');
@@ -320,12 +400,14 @@ void Interpreter::arc(Block& block, const Position& to) {
   } catch (const Error& error) {
     fail(error.what());
   }
-  add(path, false, speed);
+  add(path, false, feed(operation_, path.length()));
 }
 
 void Interpreter::cycle(Block& block) {
   if (plane_ != nc::Plane::xy) fail(operation_ + " in G18 or G19, expected G17");
   if (compensation_.active()) fail(operation_ + " under radius compensation, expected G40 before it");
+  if (motion_ == 87) fail("G87: back boring leaves an undercut, which the stock cannot have");
+  if (feed_mode_ == FeedMode::inverse_time) fail(operation_ + " in G93, expected G94 or G95");
   const Word* retract = block.take('R');
   const Word* bottom = block.take('Z');
   const Word* peck = block.take('Q');
@@ -334,7 +416,7 @@ void Interpreter::cycle(Block& block) {
   if (!repeat) repeat = block.take('L');
   if (!in_cycle_) {
     if (!retract || !bottom) fail(operation_ + " without " + (retract ? "Z" : "R") + ", expected R and Z");
-    if (motion_ == 83 && !peck) fail("G83 without Q, expected the depth of a peck");
+    if (pecks() && !peck) fail(operation_ + " without Q, expected the depth of a peck");
     cycle_ = {};
     cycle_.initial = known({0.0, 0.0, position_[2]}, operation_)[2];
     in_cycle_ = true;
@@ -344,7 +426,7 @@ void Interpreter::cycle(Block& block) {
         relative_ ? cycle_.initial + length(*retract->value) : length(*retract->value) + offset_[2];
   if (bottom)
     cycle_.bottom = relative_ ? cycle_.retract + length(*bottom->value) : length(*bottom->value) + offset_[2];
-  if (peck) {
+  if (peck && pecks()) {
     cycle_.peck = std::abs(length(*peck->value));
     if (!(cycle_.peck > 0.0)) refuse(*peck, peck->text() + ", expected a depth above 0");
   }
@@ -377,24 +459,27 @@ void Interpreter::cycle(Block& block) {
 }
 
 void Interpreter::drill(const Point& hole, double retract) {
-  const double speed = feed(operation_);
+  const double speed = feed(operation_, 0.0);
   const auto at = [&](double z) { return Point{hole[0], hole[1], z}; };
   rapidTo(at(cycle_.retract));
-  const auto down = [&](double z, double dwell) {
+  const auto feedTo = [&](double z, double dwell) {
     add(PathSegment::line(known(position_, operation_), at(z)), false, speed, dwell);
     position_[2] = z;
   };
-  if (motion_ == 83 && (cycle_.retract - cycle_.bottom) / cycle_.peck > MAX_PECKS)
-    fail(formatted("G83 with more than %.0f pecks", MAX_PECKS));
-  const double wait = motion_ == 82 ? cycle_.dwell : 0.0;
-  if (motion_ == 83) {
+  if (pecks() && (cycle_.retract - cycle_.bottom) / cycle_.peck > MAX_PECKS)
+    fail(operation_ + formatted(" with more than %.0f pecks", MAX_PECKS));
+  if (pecks()) {
     for (double depth = cycle_.retract - cycle_.peck; depth > cycle_.bottom + 1e-9; depth -= cycle_.peck) {
-      down(depth, 0.0);
-      rapidTo(at(cycle_.retract));
+      feedTo(depth, 0.0);
+      if (motion_ == 83) rapidTo(at(cycle_.retract));  // G73 breaks the chip only
       rapidTo(at(std::min(cycle_.retract, depth + PECK_CLEARANCE)));
     }
   }
-  down(cycle_.bottom, wait);
+  const bool taps = motion_ == 74 || motion_ == 84;
+  const bool waits = taps || motion_ == 76 || motion_ == 82 || motion_ == 88 || motion_ == 89;
+  feedTo(cycle_.bottom, waits ? cycle_.dwell : 0.0);
+  // Tapping and boring with a feed on the way out; G76, G86 and G88 leave with the spindle at rest.
+  if (taps || motion_ == 85 || motion_ == 89) feedTo(cycle_.retract, 0.0);
   rapidTo(at(retract));
 }
 

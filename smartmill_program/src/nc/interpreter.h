@@ -32,7 +32,7 @@ class Interpreter {
   struct Cycle {
     double retract = 0.0, bottom = 0.0;  // [m] R, Z
     double initial = 0.0;                // [m] z before the first hole
-    double peck = 0.0;                   // [m] Q of G83
+    double peck = 0.0;                   // [m] Q of G73 and G83
     double dwell = 0.0;                  // [s]
   };
 
@@ -40,7 +40,9 @@ class Interpreter {
   void compensated(const std::function<void()>& action) const;
   void setModes(Block& block);
   void setUnits(const nc::Word& word);
-  void setWorkOffset(const nc::Word& word);
+  void setWorkOffset(Block& block, const nc::Word& word);
+  void setLocalOffset(Block& block, const nc::Word& code);
+  void setRotation(Block& block, const nc::Word& code);
   void setTool(Block& block);
   void setCompensation(Block& block);
   void dwell(Block& block, const nc::Word& code);
@@ -50,12 +52,14 @@ class Interpreter {
   void cycle(Block& block);
   void drill(const Point& hole, double retract);
 
+  bool pecks() const { return motion_ == 73 || motion_ == 83; }
   bool hasAxes(const Block& block) const { return block.has('X') || block.has('Y') || block.has('Z'); }
   double length(double value);
   Position target(Block& block, bool with_z = true);
   static double secondsOf(const nc::Word& word);
   Point known(const Position& position, const std::string& what) const;
-  double feed(const std::string& operation) const;
+  double feed(const std::string& operation, double path_length) const;
+  nc::PathSegment rotated(const nc::PathSegment& path) const;
   void add(const nc::PathSegment& path, bool rapid, double feed, double dwell = 0.0);
   void rapidTo(const Point& point);
 
@@ -73,14 +77,18 @@ class Interpreter {
   Position position_;
   int motion_ = -1;  // -1: none; 80: cancelled
   nc::Plane plane_ = nc::Plane::xy;
-  bool relative_ = false, per_revolution_ = false, to_retract_plane_ = false;
-  std::optional<double> unit_;  // [m] of one in the program
-  std::optional<int> work_;     // 0..5: G54..G59
-  Point offset_{{0, 0, 0}};     // [m] of work_
-  std::optional<double> feed_;  // [m/min] or [m/rev]
-  FeedWord feed_word_;          // of feed_; without its unit
-  double speed_ = 0.0;          // [rad/s]
-  int turns_ = 0;               // 3 M3, 4 M4, 0 at rest
+  bool relative_ = false, to_retract_plane_ = false;
+  FeedMode feed_mode_ = FeedMode::per_minute;
+  std::optional<double> unit_;           // [m] of one in the program
+  std::optional<std::string> work_;      // "G54"
+  Point offset_{{0, 0, 0}};              // [m] of work_ with the local offset of G52
+  Point local_{{0, 0, 0}};               // [m] G52
+  double rotation_ = 0.0;                // [rad] G68, of the coordinates in which position_ is stated
+  std::array<double, 2> about_{{0, 0}};  // [m] its centre
+  std::optional<double> feed_;           // [m/min], [m/rev] or [1/min]
+  FeedWord feed_word_;                   // of feed_; without its unit
+  double speed_ = 0.0;                   // [rad/s]
+  int turns_ = 0;                        // 3 M3, 4 M4, 0 at rest
   int selected_tool_ = 0, tool_ = 0;
   CutterCompensation compensation_;
   std::optional<int> radius_offset_;  // D

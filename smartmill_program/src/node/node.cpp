@@ -12,11 +12,14 @@
 #include <smartmill_msgs/ProgramProgress.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/is_ready.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_core/units.h"
+#include "smartmill_program/nc/linuxcnc_program.h"
 #include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/stock/triangle_mesh.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
@@ -41,7 +44,9 @@ const Workpiece& workpieceOf(const ToolModels& models, const std::string& key) {
   throw Error(key + ": not stated, expected a value here or a model with a workpiece");
 }
 
-StockBlock blockOf(const NodeParameters& parameters, const ToolModels& models) {
+StockShape stockOf(const NodeParameters& parameters, const ToolModels& models) {
+  if (!parameters.stock_file.empty())
+    return StockShape::mesh(std::make_shared<TriangleMesh>(readStl(parameters.stock_file, units::MM)));
   const std::array<double, 3>& size = parameters.stock_size;
   const bool own = std::any_of(size.begin(), size.end(), [](double s) { return s > 0.0; });
   StockBlock block;
@@ -90,9 +95,11 @@ ProgramNode::Prepared ProgramNode::prepare(const NodeParameters& parameters) {
   ToolModels models(wordsOf(parameters.models));
   ReaderOptions reader;
   reader.tool_radius = [&models](int tool) { return models.radius(tool); };
-  std::vector<Move> moves = readProgram(parameters.program, reader);
+  std::vector<Move> moves =
+      parameters.linuxcnc ? interpretWithLinuxcnc(readText(parameters.program), parameters.program, reader)
+                          : readProgram(parameters.program, reader);
   for (const Move& move : moves) models.of(move.tool);
-  Stock stock(blockOf(parameters, models), parameters.resolution);
+  Stock stock(stockOf(parameters, models), parameters.resolution);
   SimulationOptions simulation;
   simulation.step_share = parameters.step_share;
   simulation.rapid = models.rapid();

@@ -11,7 +11,8 @@ namespace smartmill::program {
 
 /// Parameters of program_node.
 struct NodeParameters {
-  std::string program, models;
+  std::string program, models, stock_file;
+  bool linuxcnc = false;
   std::array<double, 3> stock_size{{0, 0, 0}}, stock_corner{{0, 0, 0}}, program_zero{{0, 0, 0}};
   double resolution = 1.0e-4;
   double step_share = SimulationOptions().step_share;
@@ -38,11 +39,14 @@ struct NodeParameters {
         "size of the stock along X, Y, Z; all 0: the workpiece of the model, and stock_corner is unused");
     table.list("stock_corner", stock_corner, "m", Range(),
                "corner of the stock of least X, Y, Z in the coordinates of the program");
+    table.text("stock_file", stock_file,
+               "STL file of the stock (mm, coordinates of the program), in place of a block; empty: none");
     table.list("program_zero", program_zero, "m", Range(),
                "machine position at which the tip of the tool is at the zero of the program");
     table.number("resolution", resolution, "m", Range::openLow(0.0, 0.01),
                  "width of the columns of the stock");
     table.number("step_share", step_share, "1", Range::openLow(0.0, 1.0), "length of a step per tool radius");
+    table.flag("linuxcnc", linuxcnc, "true: LinuxCNC's own interpreter (rs274) reads the program");
     table.section("Names in conditions and results.");
     table.text("tool", tool, "name of the tool; of several, T and its number are appended");
     table.text("material", material, "workpiece material; empty: that of the model's workpiece");

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/is_ready.h"
+#include "smartmill_core/model/tool_files.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_ros/conversions.h"
@@ -19,35 +20,24 @@ namespace {
 constexpr double ANSWER_PERIOD = 0.1;  // [s]
 constexpr double PERCENT = 100.0;
 
-MachineModel modelOf(const ToolNodeParameters& parameters) {
-  if (parameters.model.empty()) throw Error("model: empty: expected the path of a smartmill-model/1 file");
-  MachineModel model = readMachineModel(parameters.model);
-  model.needTool("distinguish its teeth");
-  return model;
-}
-
-/// Whether the mean tangential force follows from them.
-bool giveTangentialForce(const CuttingCoefficients& k) {
-  return std::isfinite(k.ktc + k.kte);
+SharpTools toolsOf(const ToolNodeParameters& parameters) {
+  if (parameters.model.empty()) return SharpTools({});
+  if (parameters.model.find('=') != std::string::npos)
+    return SharpTools(readToolModels(parameters.model, "model"));
+  return SharpTools({{0, readMachineModel(parameters.model)}});
 }
 
 }  // namespace
 
 ToolNode::ToolNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<ToolNodeParameters>()),
-      model_(modelOf(parameters_)),
       shell_(nh, private_nh, "tool", parameters_.input_timeout),
-      monitor_(parameters_.monitor, *model_.tool, parameters_.hold_back,
+      monitor_(parameters_.monitor, toolsOf(parameters_), parameters_.hold_back,
                [this](const ToolReport& report) { publish(report); }),
       publisher_(nh.advertise<smartmill_msgs::ToolCondition>(names::TOOL_CONDITION, STREAM_QUEUE, true)),
       new_tool_(nh.advertiseService(names::NEW_TOOL, &ToolNode::newTool, this)),
       hold_(nh.serviceClient<smartmill_msgs::FeedHold>(names::FEED_HOLD)) {
-  if (model_.cutting) {
-    const CuttingCoefficients& k = *model_.cutting;
-    from_model_ = giveTangentialForce(k);
-    if (from_model_) monitor_.setCoefficients(k, model_.cutting_std.value_or(NOT_IDENTIFIED));
-  }
-  if (model_.tool->teeth < 2)
+  if (monitor_.tool().teeth < 2)
     ROS_WARN("a tool with one tooth: its loss is not distinguished from the end of a cut");
   listen();
   shell_.diagnose("tool", [this](auto& status) { diagnose(status); });
@@ -66,15 +56,8 @@ void ToolNode::listen() {
   inputs.on<smartmill_msgs::CuttingCondition>(
       names::CUTTING_CONDITION,
       [this](const smartmill_msgs::CuttingCondition& message, double) { monitor_.push(fromMsg(message)); });
-  inputs.on<CoefficientSet>(names::COEFFICIENTS, [this](const CoefficientSet& set, double) { handle(set); });
-}
-
-/// The first set of a pair is that of the sharp tool, since later ones follow the wear.
-void ToolNode::handle(const CoefficientSet& set) {
-  const std::string pair = set.tool + " in " + set.material;
-  if (from_model_ || pair == coefficients_of_ || !giveTangentialForce(set.value)) return;
-  coefficients_of_ = pair;
-  monitor_.setCoefficients(set.value, set.std_dev);
+  inputs.on<CoefficientSet>(names::COEFFICIENTS,
+                            [this](const CoefficientSet& set, double) { monitor_.tools().add(set); });
 }
 
 bool ToolNode::newTool(smartmill_msgs::NewTool::Request&, smartmill_msgs::NewTool::Response& response) {
@@ -147,7 +130,7 @@ void ToolNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.summaryf(Level::ERROR, "tooth %d is lost", loss->tooth + 1);
   } else if (dead) {
     status.summary(Level::STALE, "no data on " + dead->topic());
-  } else if (model_.tool->teeth < 2) {
+  } else if (monitor_.tool().teeth < 2) {
     status.summary(Level::OK, "one tooth: its loss is not detected");
   } else {
     status.summary(Level::OK, "no tooth is lost");
@@ -165,9 +148,14 @@ void ToolNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.add("wear of the edge coefficients [%]", PERCENT * last_.wear->edge_wear);
     status.add("its standard deviation [%]", PERCENT * last_.wear->edge_wear_std);
   }
-  status.add("coefficients of the sharp tool", from_model_                ? model_.file
-                                               : coefficients_of_.empty() ? std::string("not known")
-                                                                          : coefficients_of_);
+  const CuttingCondition& condition = monitor_.condition();
+  const std::optional<SharpCoefficients> sharp = monitor_.tools().of(condition);
+  status.add("tool", condition.tool_name);
+  status.add("coefficients of the sharp tool",
+             sharp ? sharp->source
+             : monitor_.tools().hasModel(condition) || condition.tool_name.empty()
+                 ? std::string("not known")
+                 : "not known, and no model has this tool");
   if (parameters_.hold_on_breakage) status.add("feed hold", answered_.empty() ? "not requested" : answered_);
 }
 

@@ -28,7 +28,6 @@ class ToolNode {
 
  private:
   void listen();
-  void handle(const CoefficientSet& coefficients);
   bool newTool(smartmill_msgs::NewTool::Request& request, smartmill_msgs::NewTool::Response& response);
   void publish(const ToolReport& report);
   void requestHold();
@@ -36,15 +35,13 @@ class ToolNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ToolNodeParameters parameters_;
-  MachineModel model_;
-  bool from_model_ = false;  // coefficients of the sharp tool
   NodeShell shell_;
   ToolMonitor monitor_;
   ros::Publisher publisher_;
   ros::ServiceServer new_tool_;
   ros::ServiceClient hold_;
   std::future<smartmill_msgs::FeedHold::Response> answer_;
-  std::string answered_, coefficients_of_;
+  std::string answered_;
   ToolReport last_;
 };
 

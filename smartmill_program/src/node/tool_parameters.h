@@ -23,7 +23,7 @@ struct ToolNodeParameters {
     table.atLaunch(
         "model", model,
         "path of a smartmill-model/1 file with the tool, and the coefficients of the sharp tool if "
-        "they are known");
+        "they are known; N=FILE for tool N of several, separated by blanks");
     table.choice("force", force, {"compensated", "dynamometer"},
                  "compensated (force/compensated) or dynamometer (daq/dynamometer, force on the tool)");
     monitor.declare(table);

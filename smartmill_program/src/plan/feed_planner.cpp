@@ -71,10 +71,10 @@ void FeedPlanner::addMoves(const std::vector<Move>& moves) {
     if (!isFeed(move)) continue;
     LineFeed& line = lines_[move.line];
     const FeedWord& word = move.feed_word;
-    if (line.seen && line.per_revolution != word.per_revolution)
-      fail(move.line, move.operation + " is executed in G94 and in G95, expected one of them");
+    if (line.seen && line.mode != word.mode)
+      fail(move.line, move.operation + " is executed in two of G93, G94 and G95, expected one of them");
     line.seen = true;
-    line.per_revolution = word.per_revolution;
+    line.mode = word.mode;
     const FeedBound bound = bounds_.of(move);
     line.bound.lower(bound.feed / word.unit, bound.limit);
     // The tool drills by pecks: what is air in one step is the hole of the previous one.

@@ -58,20 +58,21 @@ double largestPitchShare(const ToolGeometry& tool) {
   return *std::max_element(tool.pitch.begin(), tool.pitch.end()) * tool.teeth / units::TWO_PI;
 }
 
-/// Largest sin(phi) in a contact.
-double largestSine(const Contact& contact) {
-  double sine = 0.0;
-  for (const ContactArc& arc : contact.arcs) {
+/// Largest sin(phi) sin(kappa) in a contact.
+double largestChipShare(const Contact& contact) {
+  double share = 0.0;
+  for (const EngagedArc& arc : contact.arcs) {
     const bool crosses = arc.entry <= 0.5 * units::PI && arc.exit >= 0.5 * units::PI;
-    sine = std::max(sine, crosses ? 1.0 : std::max(std::sin(arc.entry), std::sin(arc.exit)));
+    const double sine = crosses ? 1.0 : std::max(std::sin(arc.entry), std::sin(arc.exit));
+    share = std::max(share, sine * arc.chip_share);
   }
-  return sine;
+  return share;
 }
 
 }  // namespace
 
 double largestChip(const ToolGeometry& tool, const Contact& contact, double feed_per_tooth) {
-  return feed_per_tooth * largestPitchShare(tool) * largestSine(contact);
+  return feed_per_tooth * largestPitchShare(tool) * largestChipShare(contact);
 }
 
 FeedBound StepBounds::of(const Move& move) const {

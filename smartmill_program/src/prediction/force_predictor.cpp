@@ -12,19 +12,20 @@ namespace {
 constexpr double ANGLE_STEP = 1.5;       // [deg] of the spindle: a smooth peak within 0.01 %
 constexpr double SAME_ANGLE = 2e-4;      // [rad] resolution of a contact
 constexpr double SAME_LENGTH = 1e-7;     // [m] a tenth of the last digit of a program
+constexpr double SAME_SLOPE = 1e-4;      // [1]
 constexpr double INSIDE = 1e-9;          // [rad] of an arc, despite rounding
 constexpr double REFERENCE_FEED = 1e-4;  // [m] any: the force is affine in the feed per tooth
 
 }  // namespace
 
 bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const {
-  if (contact.arcs.size() != contact_.arcs.size() ||
+  if (contact.arcs.size() != contact_.arcs.size() || std::abs(contact.slope - contact_.slope) > SAME_SLOPE ||
       std::abs(feed_per_tooth - feed_per_tooth_) > 1e-6 * feed_per_tooth)
     return false;
   for (std::size_t i = 0; i < contact.arcs.size(); ++i) {
-    const ContactArc &a = contact.arcs[i], &b = contact_.arcs[i];
+    const EngagedArc &a = contact.arcs[i], &b = contact_.arcs[i];
     if (std::abs(a.entry - b.entry) > SAME_ANGLE || std::abs(a.exit - b.exit) > SAME_ANGLE ||
-        std::abs(a.depth - b.depth) > SAME_LENGTH)
+        std::abs(a.bottom - b.bottom) > SAME_LENGTH || std::abs(a.top - b.top) > SAME_LENGTH)
       return false;
   }
   return true;
@@ -32,8 +33,11 @@ bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const
 
 std::vector<MechanisticForce> ForcePredictor::cutsOf(const Contact& contact, double feed_per_tooth) const {
   std::vector<MechanisticForce> cuts;
-  for (const ContactArc& arc : contact.arcs)
-    cuts.emplace_back(tool_, coefficients_, Engagement{arc.entry, arc.exit, arc.depth, feed_per_tooth});
+  for (const EngagedArc& arc : contact.arcs)
+    cuts.emplace_back(
+        tool_, coefficients_,
+        Engagement{arc.entry, arc.exit, arc.top, feed_per_tooth, {}, -contact.slope * feed_per_tooth},
+        arc.bottom);
   return cuts;
 }
 
@@ -44,10 +48,11 @@ std::vector<double> ForcePredictor::angles(const Contact& contact) const {
   const int count = static_cast<int>(std::ceil(units::degFromRad(range) / ANGLE_STEP));
   std::vector<double> angles;
   for (int k = 0; k < count; ++k) angles.push_back(range * (k + 0.5) / count);
-  for (const ContactArc& arc : contact.arcs) {
-    const double lag = tool_.lag() * arc.depth;
+  for (const EngagedArc& arc : contact.arcs) {
+    const double low = tool_.lag() * arc.bottom, high = tool_.lag() * arc.top;
     for (int tooth = 0; tooth < (tool_.pitch.empty() ? 1 : tool_.teeth); ++tooth)
-      for (const double tip : {arc.entry + INSIDE, arc.exit - INSIDE, arc.entry + lag, arc.exit + lag})
+      for (const double tip :
+           {arc.entry + low + INSIDE, arc.exit + low - INSIDE, arc.entry + high, arc.exit + high})
         angles.push_back(std::fmod(tip - tool_.toothAngle(tooth) + units::TWO_PI, range));
   }
   return angles;

@@ -25,6 +25,9 @@ StepPrediction StepPredictor::predict(const Step& step) {
   prediction.power = prediction.force.mean.torque * move.spindle_speed;
   if (with_stability_ && tool.limits.available())
     prediction.limit = tool.limits.limit(step.contact, step.feed_angle, move.left_hand, move.spindle_speed);
+  if (with_stability_ && tool.walls.available() && prediction.limit > step.contact.axialDepth())
+    prediction.wall_error = tool.walls.error(step.contact, step.feed_angle, move.left_hand,
+                                             move.spindle_speed, prediction.feed_per_tooth * step.feed_share);
   return prediction;
 }
 

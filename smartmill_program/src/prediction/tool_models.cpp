@@ -1,9 +1,8 @@
 #include "smartmill_program/prediction/tool_models.h"
 
-#include <algorithm>
-
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/tool_files.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::program {
@@ -24,23 +23,13 @@ MachineModel withTool(const std::string& file) {
   return model;
 }
 
-/// Number before '=' if there is one; nullopt: a file only.
-std::optional<int> numberOf(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0 || equals > 4) return std::nullopt;
-  const std::string number = text.substr(0, equals);
-  if (!std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; }))
-    return std::nullopt;
-  return std::stoi(number);
-}
-
 }  // namespace
 
 ToolModels::ToolModels(const std::vector<std::string>& files) {
   for (const std::string& text : files) {
-    if (const std::optional<int> number = numberOf(text)) {
-      if (!models_.emplace(*number, withTool(text.substr(text.find('=') + 1))).second)
-        throw Error("--model " + text + ": tool " + std::to_string(*number) + " a second time");
+    if (const ToolFile tool = toolFileOf(text); tool.number) {
+      if (!models_.emplace(*tool.number, withTool(tool.file)).second)
+        throw Error("--model " + text + ": tool " + std::to_string(*tool.number) + " a second time");
     } else if (only_) {
       throw Error("--model " + text + ": expected N=FILE, the number of the tool for each of several models");
     } else {
@@ -73,6 +62,20 @@ const MachineModel& ToolModels::of(int tool) {
   const MachineModel model = *only_;
   only_.reset();
   return models_.emplace(tool, model).first->second;
+}
+
+const ToolShape& ToolModels::shape(int tool) {
+  const auto known = shapes_.find(tool);
+  if (known != shapes_.end()) return known->second;
+  const MachineModel& model = of(tool);
+  // An inclined edge of unknown height reaches above any stock.
+  constexpr double UNLIMITED = 1.0;  // [m]
+  ToolShape shape(ToolProfile(*model.tool, model.edge_height.value_or(UNLIMITED)));
+  if (model.holder_diameter && model.stickout) {
+    shape.holder_radius = 0.5 * *model.holder_diameter;
+    shape.holder_height = *model.stickout;
+  }
+  return shapes_.emplace(tool, shape).first->second;
 }
 
 }  // namespace smartmill::program

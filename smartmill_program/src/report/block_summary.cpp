@@ -20,8 +20,9 @@ BlockSummary::BlockSummary(const Move& move)
     : block(move.block), line(move.line), tool(move.tool), operation(move.operation) {
 }
 
-void BlockSummary::add(const Step& step, const StepPrediction& prediction, double radius) {
+void BlockSummary::add(const Step& step, const StepPrediction& prediction) {
   length += step.length;
+  holder_hit = holder_hit || step.holder_hit;
   time += step.time;
   if (step.move->rapid) {
     rapid_hit = rapid_hit || !step.air();
@@ -36,13 +37,33 @@ void BlockSummary::add(const Step& step, const StepPrediction& prediction, doubl
   raise(feed_per_tooth, prediction.feed_per_tooth);
   if (step.contact.empty()) return;
   raise(axial_depth, step.contact.axialDepth());
-  raise(radial_depth, step.contact.radialDepth(radius));
+  raise(radial_depth, step.contact.radialDepth());
   lower(entry, step.contact.entry());
   raise(exit, step.contact.exit());
   raise(peak_force, prediction.force.peak_force);
   raise(peak_torque, prediction.force.peak_torque);
   raise(power, prediction.power);
   lower(margin, prediction.limit / step.contact.axialDepth());
+  if (std::isnan(wall_error) || std::abs(prediction.wall_error) > std::abs(wall_error))
+    wall_error = prediction.wall_error;
+}
+
+std::string collisionText(const std::string& name, const std::vector<BlockSummary>& blocks) {
+  const BlockSummary* first = nullptr;
+  std::size_t others = 0;
+  for (const BlockSummary& block : blocks) {
+    if (!block.rapid_hit && !block.holder_hit) continue;
+    if (first) {
+      ++others;
+    } else {
+      first = &block;
+    }
+  }
+  if (!first) return {};
+  std::string text = name + ": line " + std::to_string(first->line) + ": " + first->operation + ": " +
+                     (first->rapid_hit ? "a rapid move hits the stock" : "the holder hits the stock");
+  if (others > 0) text += " (and " + std::to_string(others) + " more blocks)";
+  return text;
 }
 
 }  // namespace smartmill::program

@@ -14,11 +14,14 @@ using units::MM;
 
 constexpr double MM3 = MM * MM * MM;
 
-/// "0-90:2.5 120-180:1": entry and exit [deg] and depth [mm] of each arc.
+/// "0-90:2.5 120-180:1": entry and exit [deg] and depth [mm] of each arc; "0-90:1..2.5" from a height on.
 std::string arcsText(const Contact& contact) {
   std::vector<std::string> arcs;
-  for (const ContactArc& arc : contact.arcs)
-    arcs.push_back(formatted("%.2f-%.2f:%.4g", degFromRad(arc.entry), degFromRad(arc.exit), arc.depth / MM));
+  for (const EngagedArc& arc : contact.arcs) {
+    const std::string from = arc.bottom > 0.0 ? formatted("%.4g..", arc.bottom / MM) : "";
+    arcs.push_back(formatted("%.2f-%.2f:%s%.4g", degFromRad(arc.entry), degFromRad(arc.exit), from.c_str(),
+                             arc.top / MM));
+  }
   return joined(arcs, " ");
 }
 
@@ -39,13 +42,15 @@ CsvWriter blockTable(const std::vector<BlockSummary>& blocks) {
   CsvWriter csv(
       "block,line,operation,tool,length_mm,time_s,axial_depth_mm,radial_depth_mm,entry_deg,exit_deg,feed_per_"
       "tooth_mm,"
-      "volume_mm3,face_volume_mm3,peak_force_n,peak_torque_nm,power_w,stability_margin,air_share,rapid_hit",
+      "volume_mm3,face_volume_mm3,peak_force_n,peak_torque_nm,power_w,stability_margin,wall_error_um,air_"
+      "share,rapid_hit,"
+      "holder_hit",
       7);
   for (const BlockSummary& b : blocks) {
     csv.row(b.block + 1, b.line, b.operation, b.tool, b.length / MM, b.time, b.axial_depth / MM,
             b.radial_depth / MM, degFromRad(b.entry), degFromRad(b.exit), b.feed_per_tooth / MM,
-            b.volume / MM3, b.face_volume / MM3, b.peak_force, b.peak_torque, b.power, b.margin, b.airShare(),
-            b.rapid_hit ? 1 : 0);
+            b.volume / MM3, b.face_volume / MM3, b.peak_force, b.peak_torque, b.power, b.margin,
+            b.wall_error / units::UM, b.airShare(), b.rapid_hit ? 1 : 0, b.holder_hit ? 1 : 0);
   }
   return csv;
 }
@@ -56,11 +61,11 @@ StepTable::StepTable()
           "radial_depth_mm,"
           "feed_per_tooth_mm,volume_mm3,face_volume_mm3,air,mean_fx_n,mean_fy_n,mean_fz_n,mean_torque_nm,"
           "peak_force_n,"
-          "peak_torque_nm,power_w,stability_limit_mm,arcs",
+          "peak_torque_nm,power_w,stability_limit_mm,wall_error_um,arcs",
           7) {
 }
 
-void StepTable::add(const Step& step, const StepPrediction& prediction, double radius) {
+void StepTable::add(const Step& step, const StepPrediction& prediction) {
   time_ += step.time;
   if (step.move->rapid) return;
   csv_.cell(step.move->block + 1).cell(step.move->line).cell(time_ - 0.5 * step.time);
@@ -71,15 +76,14 @@ void StepTable::add(const Step& step, const StepPrediction& prediction, double r
   csv_.cell(step.feed_share > 0.0 ? degFromRad(step.feed_angle) : none);
   csv_.cell(side ? degFromRad(step.contact.entry()) : none)
       .cell(side ? degFromRad(step.contact.exit()) : none);
-  csv_.cell(side ? step.contact.axialDepth() / MM : none)
-      .cell(side ? step.contact.radialDepth(radius) / MM : none);
+  csv_.cell(side ? step.contact.axialDepth() / MM : none).cell(side ? step.contact.radialDepth() / MM : none);
   csv_.cell(prediction.feed_per_tooth / MM).cell(step.volume() / MM3).cell(step.face_volume / MM3);
   csv_.cell(step.air() ? 1 : 0);
   const ForcePrediction& force = prediction.force;
   for (const double value : {force.mean.fx, force.mean.fy, force.mean.fz, force.mean.torque, force.peak_force,
                              force.peak_torque, prediction.power})
     csv_.cell(side ? value : none);
-  csv_.cell(prediction.limit / MM).cell(arcsText(step.contact));
+  csv_.cell(prediction.limit / MM).cell(prediction.wall_error / units::UM).cell(arcsText(step.contact));
   csv_.endRow();
 }
 
@@ -115,6 +119,11 @@ std::string summaryOf(const std::vector<BlockSummary>& blocks) {
   b = largest(blocks, &BlockSummary::margin, true);
   line("least stability margin", b, b ? b->margin : 0.0, "");
   if (b) text += formatted("%zu blocks above the stability limit\n", unstable);
+  b = nullptr;
+  for (const BlockSummary& block : blocks)
+    if (!std::isnan(block.wall_error) && (!b || std::abs(block.wall_error) > std::abs(b->wall_error)))
+      b = &block;
+  line("largest surface error", b, b ? b->wall_error / units::UM : 0.0, "um");
   return text;
 }
 

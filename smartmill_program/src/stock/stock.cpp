@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace smartmill::program {
 namespace {
@@ -15,8 +16,9 @@ constexpr std::size_t BORDER = 3;
 
 }  // namespace
 
-Stock::Stock(const StockBlock& block, double resolution)
-    : grid_(block, resolution),
+Stock::Stock(const StockShape& shape, double resolution)
+    : shape_(shape),
+      grid_(shape, resolution),
       tiles_x_((grid_.columns(0) + TILE - 1) / TILE),
       tiles_y_((grid_.columns(1) + TILE - 1) / TILE),
       tiles_(tiles_x_ * tiles_y_) {
@@ -79,6 +81,8 @@ double Stock::height(double x, double y) const {
   const std::array<double, 2> around = grid_.heightsAround(x, y, BORDER);
   double lowest = around[1];
   if (around[1] - around[0] > SAME_HEIGHT) {
+    if (const std::optional<double> smooth = grid_.smoothHeight(x, y, BORDER)) return *smooth;
+    lowest = std::min(lowest, shape_.top(x, y));
     // The last sweeps are the most probable ones; none is expected below the lowest column.
     const std::vector<Entry>& entries =
         tiles_[grid_.indexOf(1, y) / TILE * tiles_x_ + grid_.indexOf(0, x) / TILE].sweeps;
@@ -87,7 +91,7 @@ double Stock::height(double x, double y) const {
       if (entry->lowest >= lowest) continue;
       const Sweep& sweep = sweeps_[entry->sweep];
       const double end = entry->sweep + 1 == sweeps_.size() ? done_ : sweep.length();
-      lowest = std::min(lowest, sweep.lowestTip(x, y, 0.0, end));
+      lowest = std::min(lowest, sweep.lowestSurface(x, y, 0.0, end, lowest));
     }
   }
   return lowest <= block.low[2] ? EMPTY : lowest;
@@ -114,6 +118,19 @@ double Stock::faceVolume(double x, double y, double radius, double top, double b
     }
   }
   return touches ? sum * grid_.width(0) * grid_.width(1) : 0.0;
+}
+
+bool Stock::reaches(double x, double y, double radius, double z) const {
+  const StockBlock& block = grid_.block();
+  if (z >= block.high[2] || x + radius < block.low[0] || x - radius > block.high[0] ||
+      y + radius < block.low[1] || y - radius > block.high[1])
+    return false;
+  for (std::size_t j = grid_.indexOf(1, y - radius); j <= grid_.indexOf(1, y + radius); ++j)
+    for (std::size_t i = grid_.indexOf(0, x - radius); i <= grid_.indexOf(0, x + radius); ++i)
+      if (grid_.height(i, j) > z + SAME_HEIGHT &&
+          std::hypot(grid_.middle(0, i) - x, grid_.middle(1, j) - y) < radius)
+        return true;
+  return false;
 }
 
 }  // namespace smartmill::program

@@ -14,9 +14,10 @@ constexpr double ANGLE_JUMP = 0.3;  // [rad] of the advance against the speed
 
 }  // namespace
 
-ToolMonitor::ToolMonitor(const ToolMonitorParameters& parameters, const ToolGeometry& tool, double hold_back,
+ToolMonitor::ToolMonitor(const ToolMonitorParameters& parameters, SharpTools tools, double hold_back,
                          Output output)
     : parameters_(parameters),
+      tools_(std::move(tools)),
       watch_(parameters.watch),
       wear_(parameters.wear),
       output_(std::move(output)),
@@ -25,7 +26,7 @@ ToolMonitor::ToolMonitor(const ToolMonitorParameters& parameters, const ToolGeom
       states_(sorter_.addOptional(names::CNC_STATE)),
       angles_(sorter_.addRegular(names::SPINDLE_ANGLE)),
       blocks_(sorter_.addRegular(names::FORCE_COMPENSATED)),
-      tool_(tool) {
+      tool_(tools_.first()) {
   parameters_.validate();
   watch_.setTool(tool_);
   sorter_.onRestart([this] { restart(); });
@@ -69,7 +70,8 @@ void ToolMonitor::restart() {
   angle_.reset();
   condition_ = {};
   loss_.reset();
-  wear_.begin(condition_);
+  losses_.clear();
+  wear_.begin(condition_, std::nullopt);
   next_index_ = 0;
   steady_since_.reset();
   reported_ = -std::numeric_limits<double>::infinity();
@@ -84,7 +86,7 @@ void ToolMonitor::handle(const CuttingCondition& condition) {
   if (const std::optional<CutWear> wear = wear_.end()) report(wear->stamp, false, wear);
   const bool stated = condition.kind != CuttingCondition::Kind::none;
   if (stated && condition.tool.teeth > 0) {
-    if (condition.tool_name != condition_.tool_name) loss_.reset();
+    if (condition.tool_name != condition_.tool_name) changeTool(condition.tool_name);
     tool_ = condition.tool;
     watch_.setTool(tool_, condition.engagement.axial_depth);
   }
@@ -92,7 +94,14 @@ void ToolMonitor::handle(const CuttingCondition& condition) {
   condition_ = condition;
   if (!stated) condition_.tool_name = last_tool;
   steady_since_.reset();
-  wear_.begin(condition);
+  wear_.begin(condition, tools_.of(condition));
+}
+
+void ToolMonitor::changeTool(const std::string& name) {
+  if (loss_) losses_[condition_.tool_name] = *loss_;
+  const auto lost = losses_.find(name);
+  loss_ = lost == losses_.end() ? std::nullopt : std::optional<ToothLoss>(lost->second);
+  losses_.erase(name);
 }
 
 void ToolMonitor::handle(const CncState& state) {

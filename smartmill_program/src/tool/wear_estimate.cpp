@@ -33,22 +33,16 @@ WearEstimate::WearEstimate(const WearParameters& parameters) : parameters_(param
   parameters_.validate();
 }
 
-void WearEstimate::setCoefficients(const CuttingCoefficients& value, const CuttingCoefficients& std_dev) {
-  value_ = value;
-  std_dev_ = std_dev;
-}
-
-void WearEstimate::begin(const CuttingCondition& condition) {
+void WearEstimate::begin(const CuttingCondition& condition, const std::optional<SharpCoefficients>& sharp) {
   condition_.reset();
   count_ = 0;
   sum_ = squares_ = 0.0;
   force_sum_ = 0.0;
-  if (condition.kind != CuttingCondition::Kind::cut || !value_) return;
-  if (condition.tool_name != tool_) cuts_.clear();
+  if (condition.kind != CuttingCondition::Kind::cut || feedTurns(condition) || !sharp) return;
   tool_ = condition.tool_name;
 
   const auto matrix = meanForceMatrix(condition.tool, condition.engagement);
-  const std::array<double, 6> value = listOf(*value_), std_dev = listOf(std_dev_);
+  const std::array<double, 6> value = listOf(sharp->value), std_dev = listOf(sharp->std_dev);
   std::array<Complex, 6> column, part;
   for (std::size_t k : {0, 1, 3, 4}) {
     column[k] = Complex(matrix[0][k], matrix[1][k]);
@@ -142,14 +136,15 @@ std::optional<CutWear> WearEstimate::present() const {
     const double error = radial * std::hypot(radial_angle_std_, parameters_.force_error);
     wear.wear_std = std::hypot(wear.wear_std, error / expected);
   }
-  std::deque<Cut> cuts = cuts_;
+  const auto earlier = cuts_.find(tool_);
+  std::deque<Cut> cuts = earlier == cuts_.end() ? std::deque<Cut>() : earlier->second;
   if (mean > 0.0) cuts.push_back({mean * (chip_ + edge_), chip_, edge_});
   std::tie(wear.edge_wear, wear.edge_wear_std) = edgeWear(cuts);
   return wear;
 }
 
 void WearEstimate::forget() {
-  cuts_.clear();
+  cuts_.erase(tool_);
   condition_.reset();
   count_ = 0;
 }
@@ -157,8 +152,9 @@ void WearEstimate::forget() {
 std::optional<CutWear> WearEstimate::end() {
   const std::optional<CutWear> wear = present();
   if (wear && wear->wear > -1.0) {
-    cuts_.push_back({(1.0 + wear->wear) * (chip_ + edge_), chip_, edge_});
-    while (cuts_.size() > static_cast<std::size_t>(parameters_.cuts)) cuts_.pop_front();
+    std::deque<Cut>& cuts = cuts_[tool_];
+    cuts.push_back({(1.0 + wear->wear) * (chip_ + edge_), chip_, edge_});
+    while (cuts.size() > static_cast<std::size_t>(parameters_.cuts)) cuts.pop_front();
   }
   condition_.reset();
   count_ = 0;

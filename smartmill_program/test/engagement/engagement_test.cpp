@@ -8,11 +8,10 @@
 
 #include <gtest/gtest.h>
 
+#include "simulated_cut.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_program/engagement/cut_simulation.h"
-#include "smartmill_program/nc/program_reader.h"
 
 namespace smartmill::program {
 namespace {
@@ -25,29 +24,12 @@ using units::radFromDeg;
 constexpr double R = 5.0;        // [mm] tool radius
 constexpr double ANGLE = 0.05;   // [deg] tolerance: bisection to 0.008
 constexpr double VOLUME = 1e-3;  // [1] tolerance: steps of 0.3 mm where the tool enters and leaves
-constexpr double MM3 = MM * MM * MM;
 
-/// A simulated program in a block of 60 x 40 x 10 mm with its top at z = 0.
-struct Cut {
+/// A program in a block of 60 x 40 x 10 mm.
+struct Cut : SimulatedCut {
   explicit Cut(const std::string& text, double resolution = 0.1)
-      : stock({{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, resolution * MM),
-        moves(interpretProgram("G21 G90 G17 S3000 M3 F600\n" + text + "M30\n", "part.nc")) {
-    CutSimulation simulation(stock, [](int) { return R * MM; });
-    for (const Move& move : moves) {
-      simulation.run(move, [&](const Step& step) {
-        steps.push_back(step);
-        return true;
-      });
-    }
-  }
-  double volume() const {  // [mm3]
-    double sum = 0.0;
-    for (const Step& step : steps) sum += step.volume() / MM3;
-    return sum;
-  }
-  double columnVolume() const {  // [mm3] removed from the columns
-    return 60 * 40 * 10 - stock.columns().volume() / MM3;
-  }
+      : SimulatedCut(text, ToolProfile(R * MM), BLOCK, resolution) {}
+
   /// Expects one arc in every step of a line for which `applies`, with these angles [deg] and depth [mm].
   void expectArc(int line, const std::function<bool(const Step&)>& applies,
                  const std::function<std::array<double, 3>(const Step&)>& arc) const {
@@ -65,10 +47,6 @@ struct Cut {
     }
     EXPECT_GT(count, 5);
   }
-
-  Stock stock;
-  std::vector<Move> moves;
-  std::vector<Step> steps;
 };
 
 bool always(const Step&) {
@@ -109,7 +87,7 @@ void expectStepOver(double direction, double radial, bool down, double resolutio
   });
   for (const Step& step : cut.steps) {
     if (step.move->line == 8 && in_the_middle(step)) {
-      EXPECT_NEAR(step.contact.radialDepth(R * MM) / MM, radial, 0.01);
+      EXPECT_NEAR(step.contact.radialDepth() / MM, radial, 0.01);
     }
   }
 }
@@ -268,9 +246,9 @@ TEST(Engagement, ArcsOfDifferentDepth) {
     ASSERT_EQ(step.contact.arcs.size(), 2u);
     EXPECT_NEAR(degFromRad(step.contact.arcs[0].entry), 0, ANGLE);
     EXPECT_NEAR(degFromRad(step.contact.arcs[0].exit), 90, ANGLE);
-    EXPECT_NEAR(step.contact.arcs[0].depth, 4 * MM, 1e-6);
+    EXPECT_NEAR(step.contact.arcs[0].depth(), 4 * MM, 1e-6);
     EXPECT_NEAR(degFromRad(step.contact.arcs[1].exit), 180, ANGLE);
-    EXPECT_NEAR(step.contact.arcs[1].depth, 1 * MM, 1e-6);
+    EXPECT_NEAR(step.contact.arcs[1].depth(), 1 * MM, 1e-6);
   }
   EXPECT_GT(count, 50);
 }

@@ -95,18 +95,85 @@ TEST(SteadyStretches, AirIsFeedRapidAndDwellWithTheSpindleTurning) {
   EXPECT_NEAR(air[0].steady_to / MM, 12.0 - 1.0, 2.0 * STEP);
 }
 
-TEST(SteadyStretches, ArcsRampsAndShortCutsHaveNone) {
-  // A ramp, an arc in full immersion, 5 mm of a slot in 0.5 s.
+// The second ring of a circular pocket, of one and of two arcs. In the frame of the feed the centre of the
+// pocket is on the left at 7 mm; the wall of the first ring is 9 mm from it: 25 + 49 - 70 cos(entry) = 81.
+TEST(SteadyStretches, ARingOfAPocketIsOne) {
+  const double entry = degFromRad(std::acos(-0.1)), length = units::TWO_PI * 7.0;
+  for (const char* ring : {"G3 I-7\n", "G3 X23 Y20 I-7 J0\nG3 X37 Y20 I7 J0\n"}) {
+    const LiveProgram program = prepareText(
+        "G21 G90 G17 S3000 M3 F600\n"
+        "G0 X30 Y20 Z1\n"
+        "G1 Z-2\n"
+        "G1 X34\n"
+        "G3 I-4\n"
+        "G1 X37\n" +
+        std::string(ring) + "G0 Z5\nM30\n");
+    std::vector<SteadyStretch> rings;
+    for (const SteadyStretch& cut : cutsOf(program))
+      if (program.path.moves()[cut.move].line == 7) rings.push_back(cut);
+    ASSERT_EQ(rings.size(), 1u) << ring;
+    EXPECT_TRUE(rings[0].turns);
+    EXPECT_NEAR(degFromRad(rings[0].engagement.entry), entry, 0.1);
+    EXPECT_NEAR(degFromRad(rings[0].engagement.exit), 180.0, 0.1);
+    EXPECT_GT((rings[0].end - rings[0].begin) / MM, 0.7 * length);
+    EXPECT_NEAR(std::hypot(rings[0].to[0] - 30 * MM, rings[0].to[1] - 20 * MM), 7 * MM, 1e-6);
+  }
+}
+
+TEST(SteadyStretches, RampsHelicesAndShortCutsHaveNone) {
+  // A ramp, a helix in full immersion, 5 mm of a slot in 0.5 s.
   const LiveProgram program = prepareText(
       "G21 G90 G17 S3000 M3 F600\n"
       "G0 X20 Y20 Z1\n"
       "G1 X30 Z-2\n"
-      "G3 X30 Y30 I0 J5\n"
+      "G3 X30 Y30 Z-2.5 I0 J5\n"
       "G1 X25\n"
       "G0 Z5\n"
       "M30\n");
   EXPECT_TRUE(cutsOf(program).empty());
   EXPECT_FALSE(program.contact.empty());
+}
+
+// Raster of a ball with a step of 1 mm in a plane: the engagement changes over the height, by the closed form
+// cos(exit) = 1 - step / r; along the line it stays the same.
+TEST(SteadyStretches, ABallHasABandOfEachHeight) {
+  const LiveProgram program = prepareText(
+      "G21 G90 G17 S3000 M3 F600\n"
+      "G0 X-10 Y10 Z5\n"
+      "G1 Z-1\n"
+      "G1 X70\n"  // 4: slot
+      "G0 Z5\n"
+      "G0 X-10 Y11\n"
+      "G1 Z-1\n"
+      "G1 X70\n"  // 8: the step
+      "G0 Z5\n"
+      "M30\n",
+      {}, ", corner_radius_mm: 5.0");
+  const std::vector<SteadyStretch> cuts = cutsOf(program);
+  ASSERT_EQ(cuts.size(), 2u);
+  EXPECT_TRUE(cuts[0].engagement.bands.empty());
+  EXPECT_NEAR(cuts[0].engagement.axial_depth, 1 * MM, 2e-3 * MM);
+  const Engagement& step = cuts[1].engagement;
+  ASSERT_GT(step.bands.size(), 4u);
+  EXPECT_GT(cuts[1].steady_to, cuts[1].steady_from + 50 * MM);
+  // Torque sensitivities: integrals over the height of 1 - cos(exit) = step / r, and of exit.
+  double chip = 0.0, edge = 0.0, chip_exact = 0.0, edge_exact = 0.0, bottom = 0.0;
+  for (const EngagementBand& band : step.bands) {
+    EXPECT_NEAR(band.bottom, bottom, 1e-9);
+    bottom = band.top;
+    chip += (band.top - band.bottom) * (std::cos(band.entry) - std::cos(band.exit));
+    edge += (band.top - band.bottom) * (band.exit - band.entry);
+  }
+  constexpr int PARTS = 20000;
+  for (int k = 0; k < PARTS; ++k) {
+    const double height = (k + 0.5) / PARTS * MM, r = std::sqrt(height * (10 * MM - height));
+    const double exit = std::acos(std::max(-1.0, 1.0 - 1 * MM / r));
+    chip_exact += (1.0 - std::cos(exit)) * MM / PARTS;
+    edge_exact += exit * MM / PARTS;
+  }
+  EXPECT_NEAR(bottom, 1 * MM, 2e-3 * MM);
+  EXPECT_NEAR(chip / chip_exact, 1.0, 0.01);
+  EXPECT_NEAR(edge / edge_exact, 1.0, 0.01);
 }
 
 TEST(SteadyStretches, AProgramThatDoesNotFitItsStockIsRefused) {

@@ -129,9 +129,12 @@ TEST(PartMonitor, ComparesStretchesOfThePath) {
     EXPECT_NEAR(report.peak_force, 100.0 * report.last_line, 1e-9);
     EXPECT_TRUE(report.compensated);
     EXPECT_EQ(report.verdicts.size(), report.begin < 51.0 && 51.0 <= report.stamp ? 1u : 0u);
-    if (report.last_line == 4 && report.to < rig.begin(4) + 60 * MM)
+    if (report.last_line == 4 && report.to < rig.begin(4) + 60 * MM) {
       EXPECT_NEAR(report.predicted.peak_force / peakOf(0.0, PI), 1.0, 0.02);
-    if (report.first_line == 5 && report.last_line == 5) EXPECT_TRUE(std::isnan(report.predicted.peak_force));
+    }
+    if (report.first_line == 5 && report.last_line == 5) {
+      EXPECT_TRUE(std::isnan(report.predicted.peak_force));
+    }
   }
   EXPECT_EQ(rig.reports.back().last_line, 6);
 }

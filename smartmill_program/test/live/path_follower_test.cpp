@@ -7,6 +7,7 @@
 #include <functional>
 #include <random>
 
+#include "smartmill_core/signal/steady_path.h"
 #include "test_part.h"
 
 namespace smartmill::program {
@@ -413,8 +414,11 @@ TEST(PathFollower, OnACircleThePlaceIsFoundAtItsStartAndEnd) {
   EXPECT_EQ(follower.status().lost, 0u);
   controller.run({{0, {50, 20, -2}, 10}});
   EXPECT_EQ(follower.status().lost, 0u);
-  ASSERT_EQ(controller.cuts().size(), 1u);
-  EXPECT_EQ(controller.cuts()[0].name.substr(0, 14), "part.nc line 5");
+  ASSERT_EQ(controller.cuts().size(), 2u);
+  EXPECT_EQ(controller.cuts()[0].name.substr(0, 14), "part.nc line 4");
+  EXPECT_TRUE(feedTurns(controller.cuts()[0]));
+  EXPECT_EQ(controller.cuts()[1].name.substr(0, 14), "part.nc line 5");
+  EXPECT_FALSE(feedTurns(controller.cuts()[1]));
 }
 
 }  // namespace

@@ -246,7 +246,7 @@ TEST(CutterCompensation, PathOfLinuxCnc) {
     const std::string text = randomPath(random);
     folder.write("part.ngc", text);
     const std::string run =
-        "cd '" + folder.file(".") + "' && rs274 -t tool.tbl -g part.ngc >out 2>err </dev/null";
+        "cd '" + folder.file(".") + "' && HOME=$PWD rs274 -t tool.tbl -g part.ngc >out 2>err </dev/null";
     if (std::system(run.c_str()) != 0) continue;
     std::istringstream in(readText(folder.file("out")));
     std::vector<std::array<double, 2>> ends;

@@ -90,9 +90,89 @@ TEST(ProgramReader, InchesFeedPerRevolutionAndWorkOffsets) {
   EXPECT_NEAR(inch[0].feed, 0.254e-3 * 1000.0 / 60.0, 1e-12);
   EXPECT_TRUE(inch[0].left_hand);
   ReaderOptions options;
-  options.work_offsets[1] = {10 * MM, 20 * MM, -5 * MM};
+  options.work_offsets["G55"] = {10 * MM, 20 * MM, -5 * MM};
   const auto moved = movesOf("G54 G0 X0 Y0 Z0\nG55 G0 X1 Y1 Z1\nM30\n", options);
   expectPoint(moved[0].path.target(), 11, 21, -4);
+}
+
+TEST(ProgramReader, ExtendedAndLocalOffsets) {
+  ReaderOptions options;
+  options.work_offsets["G54.1P3"] = {10 * MM, 20 * MM, -5 * MM};
+  options.work_offsets["G59.2"] = {1 * MM, 2 * MM, 3 * MM};
+  const auto moves = movesOf(
+      "G54 G0 X0 Y0 Z0\nG54.1 P3 X1 Y1 Z1\nG52 X2 Z-1\nX1 Y1 Z1\nG59.2 X0 Y0 Z0\nG52 X0 Y0 Z0\nX0 Y0 "
+      "Z0\nM30\n",
+      options);
+  ASSERT_EQ(moves.size(), 4u);
+  expectPoint(moves[0].path.target(), 11, 21, -4);
+  expectPoint(moves[1].path.target(), 13, 21, -5);
+  expectPoint(moves[2].path.target(), 3, 2, 2);
+  expectPoint(moves[3].path.target(), 1, 2, 3);
+  EXPECT_EQ(faultOf("G54 G0 X0 Y0 Z0\nG54.1 P2 X1\nM30\n"),
+            "part.nc: line 2, column 1: G54.1P2 after G54: its offset is unknown, expected --work-offset "
+            "G54.1P2:X:Y:Z");
+}
+
+// A square and an arc about (10, 0), turned by 90 degrees about (5, 5): (x, y) becomes (10 - y, x).
+TEST(ProgramReader, RotatedCoordinates) {
+  const auto moves = movesOf(
+      START + "G68 X5 Y5 R90\nG1 X10 Y0 F100\nG91 X0 Y3\nG90 G2 X10 Y-3 I0 J-3\nG69\nG1 X0 Y0\nM30\n");
+  ASSERT_EQ(moves.size(), 4u);
+  expectPoint(moves[0].path.start(), 0, 0, 0);
+  expectPoint(moves[0].path.target(), 10, 10, 0);
+  expectPoint(moves[1].path.target(), 7, 10, 0);
+  EXPECT_NEAR(moves[2].path.sweep(), -PI, 1e-9);
+  EXPECT_NEAR(moves[2].path.centre()[0], 10 * MM, 1e-9);
+  EXPECT_NEAR(moves[2].path.centre()[1], 10 * MM, 1e-9);
+  expectPoint(moves[2].path.target(), 13, 10, 0);
+  expectPoint(moves[3].path.start(), 13, 10, 0);
+  expectPoint(moves[3].path.target(), 0, 0, 0);
+  EXPECT_EQ(faultOf(START + "G68 X5 Y5\nM30\n"),
+            "part.nc: line 3, column 1: G68 without R, expected the angle in degrees");
+  EXPECT_EQ(faultOf(START + "G68 R30\nG28 X0\nM30\n"),
+            "part.nc: line 4, column 1: G28 of X or Y under G68, expected G69 before it");
+}
+
+TEST(ProgramReader, InverseTimeFeed) {
+  const auto moves = movesOf(START + "G93 G1 X30 F2\nX40 F6\nG94 X50 F100\nM30\n");
+  EXPECT_NEAR(moves[0].feed, 30 * MM * 2 / 60, 1e-12);
+  EXPECT_NEAR(moves[1].feed, 10 * MM * 6 / 60, 1e-12);
+  EXPECT_NEAR(moves[1].feed_word.unit * 6, moves[1].feed, 1e-15);
+  EXPECT_NEAR(moves[2].feed, 0.1 / 60, 1e-12);
+  EXPECT_EQ(faultOf(START + "G93 G1 X30 F2\nX40\nM30\n"),
+            "part.nc: line 4, column 1: G1 without a feed, expected F in each block of G93");
+}
+
+TEST(ProgramReader, TappingAndBoring) {
+  const auto upwards = [](const std::string& cycle) {  // [m/s] first move out of the hole, [s] dwell
+    const auto moves = movesOf("G90 G0 X0 Y0 Z10\nS1000 M3\nG98 " + cycle + "\nG80\nM30\n");
+    std::array<double, 3> seen{};
+    for (const Move& move : moves) {
+      if (move.path.target()[2] < -4.9 * MM) seen[1] = move.dwell;
+      if (move.path.start()[2] < -4.9 * MM) seen[0] = move.rapid ? -1.0 : move.feed;
+      if (move.path.start()[2] < -4.9 * MM) seen[2] = move.path.target()[2] / MM;
+    }
+    return seen;
+  };
+  for (const std::string code : {"G84", "G74", "G89"}) {
+    const auto seen = upwards(code + " X1 Y1 Z-5 R2 P500 F600");
+    EXPECT_NEAR(seen[0], 0.01, 1e-12) << code;
+    EXPECT_NEAR(seen[1], 0.5, 1e-12) << code;
+    EXPECT_NEAR(seen[2], 2.0, 1e-9) << code;
+  }
+  EXPECT_NEAR(upwards("G85 X1 Y1 Z-5 R2 F600")[0], 0.01, 1e-12);
+  EXPECT_EQ(upwards("G86 X1 Y1 Z-5 R2 F600")[0], -1.0);
+  EXPECT_EQ(upwards("G76 X1 Y1 Z-5 R2 Q0.2 P100 F600")[0], -1.0);
+  EXPECT_EQ(faultOf("G90 G0 X0 Y0 Z10\nS1000 M3\nG98 G87 X1 Y1 Z-5 R-8 Q1 F600\nM30\n"),
+            "part.nc: line 3, column 5: G87: back boring leaves an undercut, which the stock cannot have");
+  // Chip breaking: no way out of the hole between the pecks.
+  double highest = -1.0;
+  bool inside = false;
+  for (const Move& move : movesOf("G90 G0 X0 Y0 Z10\nS1000 M3\nG99 G73 X1 Y1 Z-5 R1 Q2 F600\nG80\nM30\n")) {
+    inside = inside || move.path.target()[2] < 0.0;
+    if (inside && move.path.target()[2] < 0.9 * MM) highest = std::max(highest, move.path.target()[2]);
+  }
+  EXPECT_NEAR(highest, -0.75 * MM, 1e-9);
 }
 
 TEST(ProgramReader, UnknownPositionAfterTheReferencePoint) {

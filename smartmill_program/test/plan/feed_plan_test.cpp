@@ -51,7 +51,7 @@ struct Planned {
 Planned planOf(const std::string& text, const FeedLimits& limits, const std::string& model = MILL) {
   const TemporaryFolder folder;
   ToolModels models({folder.write("mill.yaml", model)});
-  const Stock stock({{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.2 * MM);
+  const Stock stock(StockBlock{{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.2 * MM);
   FeedPlanner planner("part.nc", text, {}, models, limits);
   const std::vector<Move> moves = interpretProgram(text, "part.nc");
   Stock cut = stock;
@@ -289,7 +289,7 @@ TEST(FeedPlan, OneLineForEachFault) {
   EXPECT_EQ(faultOf(START + "G1 X70 F6(x)00\nM30\n", limits),
             "part.nc: line 3: a comment within the F word, expected it behind the word");
   EXPECT_EQ(faultOf(START + "G94 F600\nM98 P2\nG95 F0.2\nG0 X-10\nM98 P2\nM30\nO2\nG1 X70\nM99\n", limits),
-            "part.nc: line 10: G1 is executed in G94 and in G95, expected one of them");
+            "part.nc: line 10: G1 is executed in two of G93, G94 and G95, expected one of them");
 }
 
 /// Passes with ramps, arcs, air and subprograms; F words, modal or not, at random.

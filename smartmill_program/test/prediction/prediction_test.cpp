@@ -9,7 +9,10 @@
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/prediction/wall_errors.h"
 #include "smartmill_program/program_analysis.h"
+#include "smartmill_stability/chart/surface_error.h"
+#include "smartmill_stability/solvers/model_system.h"
 
 namespace smartmill::program {
 namespace {
@@ -20,7 +23,7 @@ using units::PI;
 constexpr double SPEED = 2 * PI * 50.0;  // [rad/s] 3000 rpm
 
 Contact contactOf(double entry_deg, double exit_deg, double depth) {
-  return {{{units::radFromDeg(entry_deg), units::radFromDeg(exit_deg), depth}}};
+  return {{{units::radFromDeg(entry_deg), units::radFromDeg(exit_deg), 0.0, depth, 5 * MM}}, 0.0, 0.0};
 }
 
 // A slot with N teeth: Fx = -N a (Krc c / 4 + Kre / pi), Fy = N a (Ktc c / 4 + Kte / pi) on the tool, Fz = N
@@ -61,8 +64,8 @@ TEST(ForcePredictor, PeakOfNarrowCuts) {
       const Contact contact = up ? contactOf(0, width, 0.7 * MM) : contactOf(180 - width, 180, 0.7 * MM);
       ForcePredictor predictor(*model.tool, *model.cutting);
       const double peak = predictor.predict(contact, 0.1 * MM).peak_force;
-      const ContactArc& arc = contact.arcs[0];
-      const MechanisticForce force(*model.tool, *model.cutting, {arc.entry, arc.exit, arc.depth, 0.1 * MM});
+      const EngagedArc& arc = contact.arcs[0];
+      const MechanisticForce force(*model.tool, *model.cutting, {arc.entry, arc.exit, arc.top, 0.1 * MM});
       double finest = 0.0;
       for (int k = 0; k < 90000; ++k) {
         const CuttingForce f = force.at(0.5 * PI * k / 90000);
@@ -124,6 +127,54 @@ TEST(StabilityLimits, DynamicsTurnWithTheFeed) {
   EXPECT_GT(std::abs(of_x.limit(contact, 0.0, false, SPEED) / limit - 1.0), 0.05);
 }
 
+// A finishing pass along y with a flexible x has the wall of one along x with a flexible y, that of the
+// solver at the speed, depth and feed themselves.
+TEST(WallErrors, AreThoseOfThePassInItsFeedFrame) {
+  MachineModel x = mill(4), y = mill(4);
+  x.tool_tip.x = modes(900.0, 2e7);
+  y.tool_tip.y = modes(900.0, 2e7);
+  WallErrors of_x(x), of_y(y);
+  ASSERT_TRUE(of_y.available());
+  const Contact down = contactOf(160, 180, 3 * MM), up = contactOf(0, 20, 3 * MM);
+  for (const Contact& contact : {down, up}) {
+    const double error = of_y.error(contact, 0.0, false, SPEED, 0.05 * MM);
+    EXPECT_NEAR(of_x.error(contact, PI / 2, false, SPEED, 0.05 * MM), error, 1e-9 * std::abs(error));
+    stability::RegenerativeSystem system =
+        stability::systemOf(y, units::degFromRad(contact.entry()), units::degFromRad(contact.exit()));
+    system.chip = stability::finishingChip(y, 0.05 * MM);
+    const double exact = stability::WallPrediction(system).at(SPEED, 3 * MM).error;
+    EXPECT_GT(std::abs(exact), 0.1e-6);
+    EXPECT_NEAR(error, exact, 0.04 * std::abs(exact));  // depth and feed are rounded to 2 %
+  }
+  EXPECT_TRUE(std::isnan(of_y.error(contactOf(0, 180, 3 * MM), 0.0, false, SPEED, 0.05 * MM)));   // two walls
+  EXPECT_TRUE(std::isnan(of_y.error(contactOf(40, 120, 3 * MM), 0.0, false, SPEED, 0.05 * MM)));  // none
+  EXPECT_FALSE(WallErrors(mill(4)).available());
+}
+
+// A ball end in a slot of small depth: the force of its edges up to the depth.
+TEST(ProgramAnalysis, ForceOfABallIsThatOfItsEdge) {
+  const TemporaryFolder folder;
+  const std::string model = folder.write("ball.yaml",
+                                         "format: smartmill-model/1\ntool: {teeth: 2, diameter_mm: 10.0, "
+                                         "helix_deg: 30.0, corner_radius_mm: 5.0}\n"
+                                         "cutting:\n  Ktc_n_per_mm2: 800.0\n  Krc_n_per_mm2: 300.0\n  "
+                                         "Kac_n_per_mm2: 200.0\n  Kte_n_per_mm: 20.0\n  "
+                                         "Kre_n_per_mm: 25.0\n  Kae_n_per_mm: 3.0\n");
+  ToolModels models({model});
+  Stock stock(StockBlock{{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.1 * MM);
+  ProgramAnalysis analysis("part.nc", models, stock);
+  ForcePrediction middle;
+  analysis.run(interpretProgram("G21 G90 G0 X-10 Y20 Z-1\nS3000 M3\nG1 X70 F600\nG0 Z5\nM30\n", "part.nc"),
+               [&](const Step& step, const StepPrediction& prediction) {
+                 if (step.tip[0] > 29 * MM && step.tip[0] < 31 * MM) middle = prediction.force;
+               });
+  const MachineModel ball = readMachineModel(model);
+  const CuttingForce mean = MechanisticForce(*ball.tool, *ball.cutting, {0.0, PI, 1 * MM, 0.1 * MM}).mean();
+  EXPECT_NEAR(middle.mean.fy, mean.fy, 0.01 * std::abs(mean.fy));
+  EXPECT_NEAR(middle.mean.fz, mean.fz, 0.01 * std::abs(mean.fz));
+  EXPECT_NEAR(middle.mean.torque, mean.torque, 0.01 * mean.torque);
+}
+
 constexpr const char* MODEL =
     "format: smartmill-model/1\ntool: {teeth: 4, diameter_mm: 10.0, helix_deg: 30.0}\ncutting:\n  "
     "Ktc_n_per_mm2: 800.0\n  "
@@ -135,7 +186,7 @@ constexpr const char* MODEL =
 TEST(ProgramAnalysis, PowerIsSpecificEnergyTimesRemovalRate) {
   const TemporaryFolder folder;
   ToolModels models({folder.write("mill.yaml", MODEL)});
-  Stock stock({{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.1 * MM);
+  Stock stock(StockBlock{{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.1 * MM);
   ProgramAnalysis analysis("part.nc", models, stock);
   const auto moves =
       interpretProgram("G21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nG0 Z5\nM30\n", "part.nc");
@@ -152,13 +203,44 @@ TEST(ProgramAnalysis, PowerIsSpecificEnergyTimesRemovalRate) {
   EXPECT_TRUE(std::isnan(cut.margin));  // the tool is rigid
 }
 
+// On a ramp of a ball end as well, with the axial part of the feed, down and up; of a bull nose up only, as
+// its flat part has no force in the model.
+TEST(ProgramAnalysis, PowerOnARampIsSpecificEnergyTimesRemovalRate) {
+  for (const char* radius : {"5.0", "2.0"}) {
+    const TemporaryFolder folder;
+    ToolModels models(
+        {folder.write("mill.yaml",
+                      "format: smartmill-model/1\ntool: {teeth: 2, diameter_mm: 10.0, helix_deg: "
+                      "30.0, corner_radius_mm: " +
+                          std::string(radius) +
+                          "}\ncutting:\n  Ktc_n_per_mm2: 800.0\n  Krc_n_per_mm2: 300.0\n  "
+                          "Kac_n_per_mm2: 200.0\n  Kte_n_per_mm: 0.0\n  Kre_n_per_mm: 0.0\n  "
+                          "Kae_n_per_mm: 0.0\n")});
+    Stock stock(StockBlock{{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.1 * MM);
+    ProgramAnalysis analysis("part.nc", models, stock);
+    int ramps = 0;
+    analysis.run(interpretProgram("G21 G90 G0 X-10 Y10 Z-1\nS3000 M3\nG1 X70 Z-6 F600\nG0 Z5\nX70 Y28\nG1 "
+                                  "Z-6\nG1 X-10 Z-1 F600\nG0 Z5\nM30\n",
+                                  "part.nc"),
+                 [&](const Step& step, const StepPrediction& prediction) {
+                   if (step.tip[0] < 20 * MM || step.tip[0] > 40 * MM || step.move->rapid) return;
+                   if (step.move->line == 3 && radius != std::string("5.0")) return;
+                   ++ramps;
+                   const double removal = step.volume() / step.time;  // [m3/s]
+                   EXPECT_NEAR(prediction.power / (800e6 * removal), 1.0, 0.01)
+                       << radius << " mm, line " << step.move->line;
+                 });
+    EXPECT_GT(ramps, 10);
+  }
+}
+
 TEST(ProgramAnalysis, ErrorsNameProgramAndLine) {
   const TemporaryFolder folder;
   const std::string model = folder.write("mill.yaml", MODEL);
   const auto faultOf = [&](const std::string& text, const std::vector<std::string>& models) {
     return errorOf([&] {
       ToolModels tools(models);
-      Stock stock({{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.2 * MM);
+      Stock stock(StockBlock{{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.2 * MM);
       ProgramAnalysis("part.nc", tools, stock).run(interpretProgram(text, "part.nc"));
     });
   };

@@ -41,15 +41,15 @@ TEST(Sweep, LowestTipIsThatOfADenselySampledPath) {
                                        PathSegment::arc({5 * MM, 0, 0}, {0, 5 * MM, 1 * MM}, {0, 0}, true),
                                        PathSegment::arc({2 * MM, 0, 0}, {2 * MM, 0, -3 * MM}, {0, 0}, false)};
   for (const PathSegment& path : paths) {
-    const Sweep sweep(path, 3 * MM);
+    const Sweep sweep(path, ToolProfile(3 * MM));
     for (int k = 0; k < 100; ++k) {
       const double x = place(random), y = place(random);
       const double from = k % 2 ? 0.0 : 0.2 * path.length(), to = k % 3 ? path.length() : 0.7 * path.length();
-      const double exact = sweep.lowestTip(x, y, from, to), expected = sampled(sweep, x, y, from, to);
+      const double exact = sweep.lowestSurface(x, y, from, to), expected = sampled(sweep, x, y, from, to);
       if (std::isinf(exact) != std::isinf(expected)) {
         // At the edge of the sweep: a little more or less of the tool decides.
-        EXPECT_NE(std::isinf(sampled(Sweep(path, 3.001 * MM), x, y, from, to)),
-                  std::isinf(sampled(Sweep(path, 2.999 * MM), x, y, from, to)));
+        EXPECT_NE(std::isinf(sampled(Sweep(path, ToolProfile(3.001 * MM)), x, y, from, to)),
+                  std::isinf(sampled(Sweep(path, ToolProfile(2.999 * MM)), x, y, from, to)));
       } else if (!std::isinf(exact)) {
         EXPECT_NEAR(exact, expected, 0.2e-6 + 3e-3 * std::abs(sweep.slope()) * MM);  // step of the sampling
       }
@@ -61,8 +61,9 @@ TEST(DexelGrid, VolumeOfASlotIsThatOfItsColumns) {
   DexelGrid grid(BLOCK, 0.1 * MM);
   EXPECT_NEAR(grid.volume(), 60 * 40 * 10 * MM * MM * MM, 1e-6 * 24e-6);
   // Width 10 mm from edges of columns: exact.
-  grid.remove(Sweep(PathSegment::line({-6 * MM, 20 * MM, -2 * MM}, {66 * MM, 20 * MM, -2 * MM}), 5 * MM), 0.0,
-              72 * MM);
+  grid.remove(
+      Sweep(PathSegment::line({-6 * MM, 20 * MM, -2 * MM}, {66 * MM, 20 * MM, -2 * MM}), ToolProfile(5 * MM)),
+      0.0, 72 * MM);
   EXPECT_NEAR(grid.volume(), (24000 - 1200) * MM * MM * MM, 1e-6 * 24e-6);
 }
 
@@ -72,7 +73,7 @@ TEST(DexelGrid, PiecesOfASweepRemoveWhatTheWholeDoes) {
                                   PathSegment::arc({40 * MM, 20 * MM, -1 * MM}, {20 * MM, 20 * MM, -3 * MM},
                                                    {30 * MM, 20 * MM}, true)}) {
     DexelGrid whole(BLOCK, 0.25 * MM), pieces(BLOCK, 0.25 * MM);
-    const Sweep sweep(path, 5 * MM);
+    const Sweep sweep(path, ToolProfile(5 * MM));
     whole.remove(sweep, 0.0, path.length());
     for (int k = 0; k < 50; ++k) pieces.remove(sweep, path.length() * k / 50, path.length() * (k + 1) / 50);
     for (std::size_t j = 0; j < whole.columns(1); ++j)
@@ -85,7 +86,7 @@ TEST(DexelGrid, PiecesOfASweepRemoveWhatTheWholeDoes) {
 TEST(Stock, AWallIsWhereTheToolHasCutIt) {
   Stock stock(BLOCK, 0.1 * MM);
   const double y = 20.0373 * MM;
-  stock.begin(Sweep(PathSegment::line({-6 * MM, y, -2 * MM}, {66 * MM, y, -2 * MM}), 5 * MM));
+  stock.begin(Sweep(PathSegment::line({-6 * MM, y, -2 * MM}, {66 * MM, y, -2 * MM}), ToolProfile(5 * MM)));
   stock.advance(72 * MM);
   for (double x = 3 * MM; x < 50 * MM; x += 1.7 * MM) {
     EXPECT_NEAR(stock.height(x, y + 5 * MM + 1e-6), 0.0, 1e-9);
@@ -102,7 +103,7 @@ TEST(Stock, LevelsOfAPocketKeepTheirWalls) {
     const double z = -0.2 * level * MM;
     for (const double y : {15.0, 18.0, 21.0}) {
       const PathSegment path = PathSegment::line({20 * MM, y * MM, z}, {40 * MM, (y + 0.013) * MM, z});
-      stock.begin(Sweep(path, 4 * MM));
+      stock.begin(Sweep(path, ToolProfile(4 * MM)));
       stock.advance(path.length());
     }
   }
@@ -124,11 +125,11 @@ TEST(Stock, FaceVolumeOfADescendingToolIsThatOfACylinder) {
 
 TEST(DexelGrid, RefusesAnEmptyBlockAndTooManyColumns) {
   EXPECT_EQ(errorOf([] {
-              DexelGrid({{0, 0, 0}, {0, 1, 1}}, 1e-4);
+              DexelGrid(StockBlock{{0, 0, 0}, {0, 1, 1}}, 1e-4);
             }),
             "stock: size 0 mm in X, expected a value above 0");
   EXPECT_EQ(errorOf([] {
-              DexelGrid({{0, 0, 0}, {1, 1, 1}}, 1e-6);
+              DexelGrid(StockBlock{{0, 0, 0}, {1, 1, 1}}, 1e-6);
             }),
             "resolution 0.001 mm: more than 2e+08 columns in the stock, expected a coarser one");
   EXPECT_EQ(errorOf([] { DexelGrid(BLOCK, 0.0); }), "resolution [m]: 0 is out of range (> 0)");

@@ -35,6 +35,7 @@ CuttingCondition cut(const std::string& name, double stamp, double feed) {
   condition.kind = CuttingCondition::Kind::cut;
   condition.name = name;
   condition.tool_name = "mill";
+  condition.material = "steel";
   condition.tool = tool();
   condition.engagement = {0.0, PI / 2.0, 2.0 * MM, feed};
   condition.spindle_speed = SPEED;
@@ -43,12 +44,27 @@ CuttingCondition cut(const std::string& name, double stamp, double feed) {
   return condition;
 }
 
+MachineModel model() {
+  MachineModel m;
+  m.tool = tool();
+  return m;
+}
+
 struct Rig {
   std::vector<ToolReport> reports;
-  ToolMonitor monitor{ToolMonitorParameters(), tool(), 0.05,
+  ToolMonitor monitor{ToolMonitorParameters(), SharpTools({{0, model()}}), 0.05,
                       [this](const ToolReport& report) { reports.push_back(report); }};
   std::uint64_t index = 0;
   double transient_from = 1e9;  // [s]
+
+  /// Its coefficients are identified.
+  void knowTool(const std::string& name) {
+    CoefficientSet set;
+    set.tool = name;
+    set.material = "steel";
+    set.value = SHARP;
+    monitor.tools().add(set);
+  }
 
   /// @param force of a time and angle
   template <class Force>
@@ -172,7 +188,7 @@ ForceSample meanForce(const CuttingCoefficients& k, const Engagement& engagement
 
 TEST(ToolMonitor, WearOfTheEdgeFollowsFromCutsOfDifferentFeed) {
   Rig rig;
-  rig.monitor.setCoefficients(SHARP, {});
+  rig.knowTool("mill");
   CuttingCoefficients worn = SHARP;
   worn.kte *= 1.5;
   worn.kre *= 1.5;
@@ -211,7 +227,7 @@ TEST(ToolMonitor, WearOfTheEdgeFollowsFromCutsOfDifferentFeed) {
 // At 50 revolutions a second the loss after one second is reported within two.
 TEST(ToolMonitor, WearEndsAtALostTooth) {
   Rig rig;
-  rig.monitor.setCoefficients(SHARP, {});
+  rig.knowTool("mill");
   rig.monitor.push(cut("cut", 0.0, 0.08 * MM));
   CuttingTeeth teeth;
   teeth.exit = PI / 2.0;
@@ -230,12 +246,64 @@ TEST(ToolMonitor, WearEndsAtALostTooth) {
   EXPECT_LE(last.wear->revolutions, 53u);
 }
 
+// Two tools in turn: the coefficients of one are not those of the other, and a lost tooth is that of its
+// tool.
+TEST(ToolMonitor, KeepsSeveralToolsApart) {
+  Rig rig;
+  rig.knowTool("mill T1");
+  CuttingCondition condition = cut("first", 0.0, 0.1 * MM);
+  condition.tool_name = "mill T1";
+  rig.monitor.push(condition);
+  rig.run(0.0, 2.0, [&](double t, double a) { return broken(1.0).at(t, a); });
+  EXPECT_TRUE(rig.monitor.loss());
+  condition.stamp = 2.0;
+  condition.name = "second";
+  condition.tool_name = "mill T2";
+  rig.monitor.push(condition);
+  rig.run(2.0, 3.0, [&](double t, double a) { return meanForce(SHARP, condition.engagement, t, a); });
+  EXPECT_FALSE(rig.monitor.loss());
+  for (const ToolReport& report : rig.reports)
+    EXPECT_NE(report.condition, "second");  // nothing is known of it
+  condition.stamp = 3.0;
+  condition.name = "third";
+  condition.tool_name = "mill T1";
+  rig.monitor.push(condition);
+  rig.run(3.0, 3.5, [&](double t, double a) { return broken(0.0).at(t, a); });
+  ASSERT_TRUE(rig.monitor.loss());
+  EXPECT_EQ(rig.monitor.loss()->tooth, 3);
+}
+
+TEST(SharpTools, AModelIsThatOfItsNumberAndGeometry) {
+  MachineModel one = model(), two = model();
+  one.cutting = SHARP;
+  two.tool->diameter = 6.0 * MM;
+  two.cutting = SHARP;
+  two.cutting->ktc *= 2.0;
+  const SharpTools tools({{1, one}, {2, two}});
+  CuttingCondition condition = cut("cut", 0.0, 0.1 * MM);
+  condition.tool_name = "mill T1";
+  ASSERT_TRUE(tools.of(condition));
+  EXPECT_EQ(tools.of(condition)->value.ktc, SHARP.ktc);
+  condition.tool_name = "mill T2";
+  EXPECT_FALSE(tools.of(condition));  // other geometry
+  condition.tool = *two.tool;
+  ASSERT_TRUE(tools.of(condition));
+  EXPECT_EQ(tools.of(condition)->value.ktc, 2.0 * SHARP.ktc);
+  condition.tool_name = "mill T3";
+  EXPECT_FALSE(tools.of(condition));
+  const SharpTools only({{0, one}});
+  condition.tool = tool();
+  EXPECT_TRUE(only.of(condition));
+  condition.tool.teeth = 3;
+  EXPECT_FALSE(only.of(condition));
+}
+
 TEST(ToolMonitor, NoWearWithoutCoefficientsOrOffThePath) {
   Rig rig;
   CuttingCondition condition = cut("cut", 0.0, 0.1 * MM);
   rig.monitor.push(condition);
   rig.run(0.0, 1.0, [&](double t, double a) { return meanForce(SHARP, condition.engagement, t, a); });
-  rig.monitor.setCoefficients(SHARP, {});
+  rig.knowTool("mill");
   condition.stamp = 1.0;
   condition.steady_from[0] = condition.steady_to[0] = 0.5;
   rig.monitor.push(condition);

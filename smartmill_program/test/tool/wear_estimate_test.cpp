@@ -47,9 +47,8 @@ CutWear wearOf(const CuttingCoefficients& sharp, const CuttingCoefficients& std_
                const CuttingCoefficients& actual, const Engagement& engagement, double gain_x = 1.0,
                double gain_y = 1.0) {
   WearEstimate estimate{WearParameters()};
-  estimate.setCoefficients(sharp, std_dev);
   const CuttingCondition condition = cut(engagement);
-  estimate.begin(condition);
+  estimate.begin(condition, SharpCoefficients{sharp, std_dev, ""});
   const CuttingForce mean = MechanisticForce(condition.tool, actual, engagement).mean();
   for (int i = 0; i < 10; ++i) estimate.add(0.02 * i, {-mean.fy * gain_x, mean.fx * gain_y});
   return estimate.present().value_or(CutWear());

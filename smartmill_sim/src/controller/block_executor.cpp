@@ -28,6 +28,8 @@ void BlockExecutor::reset() {
 void BlockExecutor::start(double time, const NcBlock& block) {
   modal_.update(block);
   if (block.macro) writeVariable(*block.macro, block.macro_value);
+  if (block.tool) selectTool(*block.tool);
+  if (block.m_code == 6 && selected_tool_ == 0) throw NcAlarm(PS_ILLEGAL_ADDRESS, "M6 WITHOUT T");
   startSpindle(time, block);
   const bool circle = modal_.motion >= 2 && (block.centre[0] || block.centre[1]);
   if (block.moves() || circle) planPath(block);
@@ -44,7 +46,8 @@ int BlockExecutor::proceed(double now, double time) {
   }
   const int m_code = std::exchange(block_.m_code, std::nullopt).value_or(-1);
   if (m_code >= 0) last_m_ = m_code;
-  if (m_code == 5 || m_code == 30 || m_code == 2) {
+  if (std::exchange(changing_, false)) tool_ = selected_tool_;
+  if (m_code == 5 || m_code == 6 || m_code == 30 || m_code == 2) {
     spindle_.stop(time);
   } else if (m_code == 19 || m_code == 119) {
     spindle_.orient(time, m_code == 19 ? 0.0 : readVariable(nc::ORIENT_VARIABLE, now).value_or(-1.0));
@@ -52,10 +55,15 @@ int BlockExecutor::proceed(double now, double time) {
     running_ = false;
   }
   wait_until_ = spindle_.settleTime();
+  if (m_code == 6) {
+    changing_ = true;
+    wait_until_ = std::max(wait_until_, time) + options_.tool_change_time;
+  }
   return m_code;
 }
 
 void BlockExecutor::halt(double time) {
+  changing_ = false;
   axes_.halt(time);
   spindle_.stop(time);
   running_ = false;
@@ -90,6 +98,13 @@ void BlockExecutor::writeVariable(int number, std::optional<double> value) {
   if (!Variables::exists(number)) throw NcAlarm(PS_VARIABLE_NUMBER, "VARIABLE NO. OUT OF RANGE");
   if (!Variables::writable(number)) throw NcAlarm(PS_VARIABLE_READ_ONLY, "WRITE PROTECTED VARIABLE");
   variables_.write(number, value);
+}
+
+void BlockExecutor::selectTool(int tool) {
+  const std::vector<int>& magazine = options_.magazine;
+  if (std::find(magazine.begin(), magazine.end(), tool) == magazine.end())
+    throw NcAlarm(PS_ILLEGAL_ADDRESS, "T" + std::to_string(tool) + " IS NOT IN THE MAGAZINE");
+  selected_tool_ = tool;
 }
 
 void BlockExecutor::startSpindle(double time, const NcBlock& block) {

@@ -33,6 +33,7 @@ class BlockExecutor {
   bool dwells(double now) const { return running_ && block_.dwell && now < wait_until_; }
   bool waitsForM() const { return running_ && block_.m_code; }
   int lastMCode() const { return last_m_; }
+  int tool() const { return tool_; }  ///< T of the tool in the spindle
 
   /// Feed hold: the axes brake to rest on their path.
   void hold(double now);
@@ -50,6 +51,7 @@ class BlockExecutor {
   void planPath(const NcBlock& block);
   double feedOf(const AxesMotion::Segment& segment) const;
   void beginNextSegment(double time);
+  void selectTool(int tool);
 
   const ControllerOptions& options_;
   const Overrides& overrides_;
@@ -61,6 +63,8 @@ class BlockExecutor {
   bool running_ = false;
   double wait_until_ = 0.0;  // [s]
   int last_m_ = 0;
+  int selected_tool_ = 0, tool_ = 0;  // T words
+  bool changing_ = false;             // the tool, at the end of the wait
 };
 
 }  // namespace smartmill::sim

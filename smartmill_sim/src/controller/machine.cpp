@@ -56,8 +56,8 @@ void ControlledMachine::checkMotion() {
 }
 
 MotionState ControlledMachine::motion() const {
-  return {axes.position(now_), axes.velocity(now_), spindle.angle(now_), spindle.speed(now_),
-          program.indicated().sequence};
+  return {axes.position(now_), axes.velocity(now_),          spindle.angle(now_),
+          spindle.speed(now_), program.indicated().sequence, executor.tool()};
 }
 
 // --- the operator

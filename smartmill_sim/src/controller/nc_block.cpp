@@ -7,7 +7,7 @@ namespace {
 
 using nc::SyntaxError;
 
-constexpr nc::Dialect DIALECT{"O:NGXYZIJRPFSM", std::string_view(" \t\n\v\f\r\0", 7), false, true};
+constexpr nc::Dialect DIALECT{"O:NGXYZIJRPFSMTH", std::string_view(" \t\n\v\f\r\0", 7), false, true};
 
 [[noreturn]] void illegalAddress(const std::string& what) {
   throw NcAlarm(PS_ILLEGAL_ADDRESS, "IMPROPER NC ADDRESS " + what);
@@ -65,6 +65,13 @@ void readGCode(int code, NcBlock& block, bool& dwell) {
     case 21:
       setWord<bool>(block.inch, code == 20, 'G');
       return;
+    case 40:
+    case 49:
+    case 80:
+      return;  // off: as at the start
+    case 43:
+      block.length_offset = true;
+      return;
     case 28:
       refuseRepeated(block.reference || block.machine, 'G');
       block.reference = true;
@@ -92,7 +99,7 @@ void readGCode(int code, NcBlock& block, bool& dwell) {
 
 void readMCode(int code, NcBlock& block) {
   refuseRepeated(block.m_code.has_value(), 'M');
-  for (const int known : {0, 2, 3, 4, 5, 19, 30, 119}) {
+  for (const int known : {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 19, 30, 119}) {
     if (code == known) {
       block.m_code = code;
       return;
@@ -123,7 +130,14 @@ std::optional<int> optionalInteger(const nc::Word& word) {
   return word.value ? std::optional<int>(nc::integer(word)) : std::nullopt;
 }
 
-void readWord(const nc::Word& word, NcBlock& block, bool& dwell, std::optional<double>& milliseconds) {
+/// Words whose place is not in the block.
+struct OtherWords {
+  bool dwell = false;
+  std::optional<double> milliseconds;
+  std::optional<int> length_offset;
+};
+
+void readWord(const nc::Word& word, NcBlock& block, OtherWords& other) {
   switch (word.address) {
     case 'O':
     case ':':
@@ -133,7 +147,7 @@ void readWord(const nc::Word& word, NcBlock& block, bool& dwell, std::optional<d
       setWord(block.sequence, optionalInteger(word), word.address);
       break;
     case 'G':
-      readGCode(nc::integer(word), block, dwell);
+      readGCode(nc::integer(word), block, other.dwell);
       break;
     case 'X':
     case 'Y':
@@ -148,7 +162,7 @@ void readWord(const nc::Word& word, NcBlock& block, bool& dwell, std::optional<d
       setWord(block.radius, word.value, word.address);
       break;
     case 'P':
-      setWord(milliseconds, word.value, word.address);
+      setWord(other.milliseconds, word.value, word.address);
       break;
     case 'F':
       setWord(block.feed, word.value, word.address);
@@ -159,6 +173,12 @@ void readWord(const nc::Word& word, NcBlock& block, bool& dwell, std::optional<d
     case 'M':
       readMCode(nc::integer(word), block);
       break;
+    case 'T':
+      setWord(block.tool, optionalInteger(word), word.address);
+      break;
+    case 'H':
+      setWord(other.length_offset, optionalInteger(word), word.address);
+      break;
     default:
       break;  // not in DIALECT
   }
@@ -166,14 +186,15 @@ void readWord(const nc::Word& word, NcBlock& block, bool& dwell, std::optional<d
 
 NcBlock readWords(nc::BlockReader& reader) {
   NcBlock block;
-  bool dwell = false;
-  std::optional<double> milliseconds;
-  while (const std::optional<nc::Word> word = reader.next()) readWord(*word, block, dwell, milliseconds);
-  if (dwell) {
-    readDwell(block, milliseconds);
-  } else if (milliseconds) {
+  OtherWords other;
+  while (const std::optional<nc::Word> word = reader.next()) readWord(*word, block, other);
+  if (other.dwell) {
+    readDwell(block, other.milliseconds);
+  } else if (other.milliseconds) {
     illegalAddress("P");
   }
+  if (block.length_offset != other.length_offset.has_value())
+    illegalAddress(block.length_offset ? "G43" : "H");
   if ((block.feed && *block.feed < 0.0) || (block.speed && *block.speed < 0.0))
     illegalAddress(block.feed && *block.feed < 0.0 ? "F" : "S");
   return block;

@@ -14,6 +14,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/model/tool_files.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/node_main.h"
@@ -25,6 +26,12 @@ namespace smartmill::sim {
 namespace {
 
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
+
+WorldOptions optionsOf(const NodeParameters& parameters) {
+  WorldOptions options = parameters.world;
+  options.magazine = readToolModels(parameters.magazine, "magazine");
+  return options;
+}
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
@@ -41,7 +48,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : nh_(std::move(nh)),
       parameters_(read(private_nh)),
       model_(readMachineModel(parameters_.model)),
-      world_(std::make_unique<World>(model_, parameters_.world)),
+      world_(std::make_unique<World>(model_, optionsOf(parameters_))),
       hammer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, STREAM_QUEUE)),
       dynamometer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, STREAM_QUEUE)),
       spindle_force_(nh_.advertise<smartmill_msgs::SampleBlock>(names::SPINDLE_FORCE, STREAM_QUEUE)),

@@ -45,6 +45,12 @@ void OperatorPanel::advertiseKeys(Controller& controller) {
     controller.feedHold();
     return {};
   });
+  advertise("program", 1, [&controller](const Request& request) -> std::string {
+    focas::ProgramsInterface& programs = controller.calls().programs;
+    focas::EwCode code = programs.storePrograms(request.text);
+    if (code == focas::EW_OK) code = programs.selectProgram(static_cast<int>(request.values[0]));
+    return code == focas::EW_OK ? std::string() : focas::ewName(code);
+  });
   advertise("cycle_start", 0, [&controller](const Request&) -> std::string {
     const focas::EwCode code = controller.calls().programs.cycleStart();
     return code == focas::EW_OK ? std::string() : focas::ewName(code);

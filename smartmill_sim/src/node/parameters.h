@@ -10,7 +10,7 @@ namespace smartmill::sim {
 
 /// Parameters of sim_node.
 struct NodeParameters {
-  std::string model;
+  std::string model, magazine;
   int port = 8193;
   std::string bind = "127.0.0.1";
   std::string axes_input;
@@ -27,6 +27,9 @@ struct NodeParameters {
     table.title(
         "Parameters of sim_node (package smartmill_sim): the simulated machine. SI units throughout.");
     table.atLaunch("model", model, "path of a smartmill-model/1 file");
+    table.atLaunch("magazine", magazine,
+                   "paths of smartmill-model/1 files with the tools to which M6 changes, N=FILE for tool N, "
+                   "separated by blanks; without it there is no tool change");
     table.section();
     table.number("port", port, "1", Range::closed(0, 65535), "FOCAS port of the controller; 0: any free one");
     table.text("bind", bind, "address to listen on");

@@ -28,13 +28,13 @@ void Cutter::addMills(double height) {
   for (std::size_t s = mills_.size(); s < slices.size(); ++s) {
     StraightMill mill;
     mill.slice = mill.actual = slices[s];
-    mill.top = slices[s].high;
     const ToolGeometry straight = toolOf(slices[s], tool_);
     const std::vector<double> radii = radiiOf(slices[s], tool_, radius_offset_);
     if (method_ == Method::tables) {
       mill.rigid.emplace(straight, lawOf(slices[s], law_), radii, path_share_);
     } else {
       mill.process.emplace(straight, lawOf(slices[s], law_), time_step_, radii, path_share_);
+      mill.process->setLean(slices[s].lean());
     }
     mills_.push_back(std::move(mill));
   }
@@ -50,16 +50,16 @@ ToolMotion Cutter::motionOf(const StraightMill& mill, const ToolMotion& now) con
 // Intersects the arcs with the height of a slice.
 void Cutter::updateContact(StraightMill& mill) {
   std::vector<ContactArc> arcs;
-  double top = 0.0;
+  double bottom = mill.slice.high, top = mill.slice.low;
   for (const ContactArc& arc : arcs_) {
-    const double height = std::min(arc.depth, mill.slice.high);
-    if (height <= mill.slice.low) continue;
-    arcs.push_back({arc.entry, arc.exit, height - mill.slice.low});
-    top = std::max(top, height);
+    const double low = std::max(arc.bottom, mill.slice.low), high = std::min(arc.depth, mill.slice.high);
+    if (high <= low) continue;
+    arcs.push_back({arc.entry, arc.exit, high - mill.slice.low, low - mill.slice.low});
+    bottom = std::min(bottom, low);
+    top = std::max(top, high);
   }
-  if (mill.slice.curved && !arcs.empty() && top != mill.top) {
-    mill.top = top;
-    mill.actual = top == mill.slice.high ? mill.slice : upTo(top, mill.slice, tool_);
+  if (mill.slice.curved && !arcs.empty() && (bottom != mill.actual.low || top != mill.actual.high)) {
+    mill.actual = between(bottom, top, mill.slice, tool_);
     const CuttingLaw law = lawOf(mill.actual, law_);
     if (mill.process) mill.process->setLaw(law);
     if (mill.rigid) mill.rigid->setLaw(law);
@@ -91,8 +91,8 @@ void Cutter::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) 
   arcs_changed_ = false;
 }
 
-void Cutter::setDepths(const std::vector<double>& depths) {
-  for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
+void Cutter::setDepths(const std::vector<ContactArc>& arcs) {
+  arcs_ = arcs;
   updateContacts();
 }
 

@@ -20,6 +20,11 @@ double depthOf(const EdgeLayer& layer, double depth) {
   return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), SMALLEST_DEPTH);
 }
 
+std::vector<ContactArc> arcsOf(const EdgeLayer& layer, std::vector<ContactArc> arcs) {
+  for (ContactArc& arc : arcs) arc.depth = std::max(depthOf(layer, arc.depth), arc.bottom + SMALLEST_DEPTH);
+  return arcs;
+}
+
 CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {
   if (layer.share == EdgeLayer::Share::all) return law;
   CuttingCoefficients& k = law.coefficients;
@@ -52,17 +57,16 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
 
 void EdgeLayers::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
   for (Layer& layer : layers_) {
-    std::vector<ContactArc> adapted = arcs;
-    for (ContactArc& a : adapted) a.depth = depthOf(layer.definition, a.depth);
+    const std::vector<ContactArc> adapted = arcsOf(layer.definition, arcs);
     if (layer.rigid) layer.rigid->engage(adapted, feedOf(now));
     if (layer.process) layer.process->engage(adapted, now);
   }
 }
 
-void EdgeLayers::setDepths(const std::vector<double>& depths) {
+void EdgeLayers::setDepths(const std::vector<ContactArc>& arcs) {
   for (Layer& layer : layers_) {
     std::vector<double> adapted;
-    for (const double d : depths) adapted.push_back(depthOf(layer.definition, d));
+    for (const ContactArc& arc : arcsOf(layer.definition, arcs)) adapted.push_back(arc.depth);
     if (layer.rigid) layer.rigid->setDepths(adapted);
     if (layer.process) layer.process->setDepths(adapted);
   }

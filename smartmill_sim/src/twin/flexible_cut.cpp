@@ -40,11 +40,10 @@ void FlexibleCut::engage(const ToolMotion& now, const TwinState& state) {
 }
 
 void FlexibleCut::updateDepths(const TwinState& state) {
-  std::vector<double> depths;
-  for (const ContactArc& a : contact.actualArcs(state)) depths.push_back(a.depth);
+  const std::vector<ContactArc> arcs = contact.actualArcs(state);
   if (!cutter_ || replaysTrace()) return;
-  cutter_->setDepths(depths);
-  layers_.setDepths(depths);
+  cutter_->setDepths(arcs);
+  layers_.setDepths(arcs);
 }
 
 CuttingForce FlexibleCut::force(const Input& input, const TwinState& state) {

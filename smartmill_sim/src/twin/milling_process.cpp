@@ -91,6 +91,13 @@ void MillingProcess::forgetRadii() {
     for (Pass& pass : passes) pass.valid_regime = -1;
 }
 
+/// [m] By which an axial feed has advanced an inclined edge across the tool since a pass. Where a rising edge
+/// still cuts, no older pass is nearer for that.
+double MillingProcess::axialChip(int tooth, int n) const {
+  const double per_angle = lean_ * history_.now().sink / history_.now().speed;
+  return per_angle * rule_.turn(tooth, per_angle > 0.0 ? n : 1);
+}
+
 void MillingProcess::addPass(int tooth) {
   std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
   const int n = static_cast<int>(passes.size()) + 1;
@@ -107,7 +114,7 @@ void MillingProcess::shapePass(int tooth, int n, Pass& pass) {
   const std::array<double, 2> fed_first = history_.at(first.delay).fed;
   pass.step = rule_.step(tooth, n) - rule_.step(tooth, 1) + lengthening(tooth, 1) - longer;
   pass.rigid = rule_.shape(tooth, n, history_.at(pass.delay).fed, fed_first);
-  pass.rigid.level -= longer;
+  pass.rigid.level += axialChip(tooth, n) - longer;
   pass.excess = pass.rigid - first.rigid;
   pass.bend = pass.excess.bend();
   pass.valid_regime = steady ? history_.regime() : -1;

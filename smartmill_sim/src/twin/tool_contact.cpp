@@ -37,7 +37,13 @@ std::vector<ContactArc> ToolContact::actualArcs(const TwinState& state) {
   const double error = state.depth_extra + state.depth_slope * progress_.path;
   depth_extra_ = state.depth_extra;
   std::vector<ContactArc> actual = arcs_;
-  for (ContactArc& a : actual) a.depth = error == 0.0 ? a.depth : std::max(a.depth + error, SMALLEST_DEPTH);
+  if (error == 0.0) return actual;
+  for (ContactArc& a : actual) {
+    // A band of a curved edge keeps its upper end where another one begins there.
+    const bool ends = std::none_of(arcs_.begin(), arcs_.end(),
+                                   [&](const ContactArc& above) { return above.bottom == a.depth; });
+    if (ends) a.depth = std::max(a.depth + error, a.bottom + SMALLEST_DEPTH);
+  }
   return actual;
 }
 

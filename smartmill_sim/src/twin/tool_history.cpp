@@ -37,7 +37,7 @@ void ToolHistory::clear(const ToolMotion& now) {
 
 void ToolHistory::advance(const ToolMotion& now) {
   if (count_ > 0) rotation_now_ += wrapped(now.angle - now_.angle);
-  if (now.speed != now_.speed || now.velocity != now_.velocity) {
+  if (now.speed != now_.speed || now.velocity != now_.velocity || now.sink != now_.sink) {
     ++regime_;
     regime_start_ = rotation_now_;
     feed_ = feedOf(now);

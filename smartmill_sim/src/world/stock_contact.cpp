@@ -11,10 +11,16 @@ namespace {
 constexpr double TURNING = 1.0;      // [rad/s] a slower spindle cannot cut
 constexpr double SAME_ANGLE = 1e-7;  // [rad]
 
+/// Along the tool axis, steeper than a ramp, whose material the side of the tool removes.
+bool plunges(const Axes3& velocity) {
+  constexpr double STEEPEST = 0.2;  // [1] of a ramp: 11 degrees
+  return velocity[2] < -STEEPEST * std::hypot(velocity[0], velocity[1]);
+}
+
 bool isSameContact(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
     return std::abs(p.entry - q.entry) < SAME_ANGLE && std::abs(p.exit - q.exit) < SAME_ANGLE &&
-           p.depth == q.depth;
+           p.depth == q.depth && p.bottom == q.bottom;
   });
 }
 
@@ -26,7 +32,7 @@ StockContact::Fault StockContact::update(const MotionState& state, const ToolMot
   std::vector<ContactArc> arcs = stock_.contact(state.position, state.velocity);
   if (!arcs.empty() && state.spindle_speed < TURNING) {
     fault = {EX_TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST"};
-  } else if (state.velocity[2] < 0.0 && stock_.hasMaterialAbove(state.position)) {
+  } else if (plunges(state.velocity) && stock_.hasMaterialAbove(state.position)) {
     fault = {EX_PLUNGED, "TOOL PLUNGED INTO STOCK"};
   }
   if (fault.alarm != 0) arcs.clear();

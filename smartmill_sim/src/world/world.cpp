@@ -28,6 +28,14 @@ MachineModel withStructure(MachineModel model, const std::optional<HammerStation
   return model;
 }
 
+/// A machine with the tool of another model.
+MachineModel withTool(MachineModel machine, const MachineModel& other) {
+  machine.tool = other.needTool("put it into the magazine");
+  if (other.cutting) machine.cutting = other.cutting;
+  if (!other.tool_tip.x.modes.empty() || !other.tool_tip.y.modes.empty()) machine.tool_tip = other.tool_tip;
+  return machine;
+}
+
 std::optional<HammerStation> stationOf(const MachineModel& model, const WorldOptions& options) {
   if (!model.hammer || !model.tool) return std::nullopt;
   return HammerStation(model, options.hammer, options.force_scatter, stepOf(options));
@@ -43,6 +51,7 @@ ControllerOptions controllerOptions(const MachineModel& model, const WorldOption
   ControllerOptions controller_options = ControllerOptions::ofModel(model);
   controller_options.load_step = 100.0 * options.load_step / fullScaleOf(model);
   controller_options.motor_temperature = options.motor.temperature;
+  for (const auto& [number, tool] : options.magazine) controller_options.magazine.push_back(number);
   return controller_options;
 }
 
@@ -66,21 +75,23 @@ World::World(const MachineModel& model, const WorldOptions& options)
       servo_(options.servo_trigger, options.motor.drives()),
       station_(stationOf(model, options)),
       tip_(withStructure(model, station_).tool_tip),
-      machine_(withStructure(model, station_), stepOf(options)),
       random_{std::mt19937_64(options.seed), {}} {
-  const ToolGeometry& tool = model.needTool("simulate the machine");
+  model.needTool("simulate the machine");
   model.needCutting("simulate the machine");
   model.needAxes("simulate the machine");
-  shortening_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
-  if (model.workpiece) stock_.emplace(*model.workpiece, tool.radius());
+  const MachineModel structured = withStructure(model, station_);
+  addTool(0, structured);
+  for (const auto& [number, tool] : options.magazine) addTool(number, withTool(structured, tool));
+  tool_ = &tools_.at(0);
+  if (model.workpiece) stock_.emplace(*model.workpiece, tool_->geometry());
   last_ = controller_.motion();
-  machine_.resetLoadMeter(0.0);
   const PlacedFrame dynamometer = placedFrame(model.frames, frames::DYNAMOMETER, frames::MACHINE);
   if (dynamometer.isTurned()) {
     if (options.plate.present)
       throw Error(model.file + ": frames.dynamometer is turned, expected an aligned one with plate_present");
     const std::array<double, 9>& r = dynamometer.rotation;
-    machine_.turnSensor({r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]});
+    for (auto& [number, tool] : tools_)
+      tool.machine.turnSensor({r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]});
     manual_.from_sensor = r;
   }
   if (options.spindle_sensor.present)
@@ -90,6 +101,24 @@ World::World(const MachineModel& model, const WorldOptions& options)
 }
 
 World::~World() = default;
+
+void World::addTool(int number, const MachineModel& model) {
+  MountedTool& tool = tools_.try_emplace(number, model, stepOf(options_)).first->second;
+  tool.shortening.assign(static_cast<std::size_t>(model.tool->teeth), 0.0);
+  tool.machine.resetLoadMeter(0.0);
+}
+
+/// The spindle is at rest. Drift and hum of the force sensor restart.
+void World::changeTool(int number) {
+  const auto found = tools_.find(number);
+  if (found == tools_.end() || &found->second == tool_) return;
+  EffectTimeline::Clock clock = found->second.machine.clock();
+  clock.start_time = tool_->machine.clock().start_time;
+  tool_ = &found->second;
+  tool_->machine.setClock(clock);
+  tool_->machine.resetLoadMeter(last_.spindle_speed);
+  if (stock_) stock_->changeTool(tool_->geometry());
+}
 
 World::StrikeAnswer World::strike(const std::string& point, const std::string& direction,
                                   std::string& message) {
@@ -163,20 +192,20 @@ void World::advance(Block& block, const std::vector<MotionState>& states) {
 
 double World::breakTooth(int tooth, double length) {
   const Lock lock(mutex_);
-  const auto teeth = static_cast<int>(shortening_.size());
+  const auto teeth = static_cast<int>(tool_->shortening.size());
   if (tooth < 0 || tooth > teeth)
     throw Error("tooth: " + std::to_string(tooth) + ", expected 1.." + std::to_string(teeth) +
                 " or 0 for a new tool");
   if (!(length >= 0.0 && std::isfinite(length)))
     throw Error("length: " + std::to_string(length) + " m, expected at least 0");
-  std::vector<double> shortening = shortening_;
+  std::vector<double> shortening = tool_->shortening;
   if (tooth == 0) {
     shortening.assign(shortening.size(), 0.0);
   } else {
     shortening[static_cast<std::size_t>(tooth) - 1] = length > 0.0 ? length : WHOLE_TOOTH;
   }
-  machine_.shortenTeeth(shortening);
-  shortening_ = shortening;
+  tool_->machine.shortenTeeth(shortening);
+  tool_->shortening = shortening;
   return static_cast<double>(index_) / SAMPLE_RATE;
 }
 
@@ -193,6 +222,7 @@ void World::simulateBlock(Block& block, const std::vector<MotionState>& states) 
   for (const auto& sensor : sensors_) sensor->begin(static_cast<double>(index_) / SAMPLE_RATE, index_, block);
   torque_ = 0.0;
   for (std::size_t i = 0; i < BLOCK; ++i) {
+    if (states[i].tool != last_.tool) changeTool(states[i].tool);
     if ((index_ + i) % options_.contact_update == 0) updateContact(states[i]);
     simulateSample(static_cast<double>(index_ + i) / SAMPLE_RATE, states[i], block);
     last_ = states[i];
@@ -204,12 +234,12 @@ void World::simulateBlock(Block& block, const std::vector<MotionState>& states) 
   }
   index_ += BLOCK;
   for (const auto& sensor : sensors_) sensor->end(block);
-  block.spindle_load = machine_.rounded(load_meter_) / full_scale_;
+  block.spindle_load = tool_->machine.rounded(load_meter_) / full_scale_;
 }
 
 void World::updateContact(const MotionState& state) {
   if (!stock_) return;
-  const StockContact::Fault fault = stock_->update(state, between(state, 0.0), machine_);
+  const StockContact::Fault fault = stock_->update(state, between(state, 0.0), tool_->machine);
   if (fault.alarm != 0) raiseAlarm(fault.alarm, fault.text);
 }
 
@@ -229,7 +259,7 @@ void World::simulateSample(double time, const MotionState& now, Block& block) {
     for (std::size_t axis = 0; axis < 2; ++axis)
       input.tip_force[axis] = push.tip_force[axis] + manual.tip_hit[axis];
     input.sensor_force = manual.table;
-    const CuttingMachine::Output output = machine_.step(input);
+    const CuttingMachine::Output output = tool_->machine.step(input);
     for (const auto& sensor : sensors_) sensor->step({input, output, push, manual, now.position[2]});
     sum.add(output.force);
     load_meter_ = output.load_meter;
@@ -251,6 +281,7 @@ ToolMotion World::between(const MotionState& now, double share) const {
     motion.centre[axis] = last_.position[axis] + share * (now.position[axis] - last_.position[axis]);
     motion.velocity[axis] = now.velocity[axis];
   }
+  motion.sink = -now.velocity[2];
   return motion;
 }
 

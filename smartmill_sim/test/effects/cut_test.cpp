@@ -260,8 +260,8 @@ TEST(Effects, cornerRadiusIsTheSameWithHistory) {
     motion.centre[0] = 3e-4 * speed * dt * i / TWO_PI;
     if (i == 1100 || i == 2100) {
       const double depth = i == 1100 ? 0.9e-3 : 4.7e-3;
-      tables.setDepths({depth});
-      history.setDepths({depth});
+      tables.setDepths({{0.0, PI, depth}});
+      history.setDepths({{0.0, PI, depth}});
     }
     const CuttingForce a = tables.step(motion), b = history.step(motion);
     history.endStep({{0.0, 0.0}});

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <numeric>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/require.h"
@@ -38,6 +41,7 @@ void ChatterDetector::reset() {
   condition_.reset();
   samples_.clear();
   angles_.clear();
+  positions_.clear();
   dropWindow();
   last_state_ = 0.0;
   next_index_ = 0;
@@ -66,6 +70,7 @@ void ChatterDetector::notSteady(double stamp) {
 void ChatterDetector::handle(const CuttingCondition& condition) {
   condition_ = condition;
   reported_invalid_ = false;
+  positions_.clear();
   // The angle is accumulated from here on, so that rounding does not depend on how long the node has run.
   if (!angles_.empty())
     angles_.assign(1, {angles_.back().time, angles_.back().measured, angles_.back().measured});
@@ -77,12 +82,50 @@ void ChatterDetector::handle(const CncState& state) {
   last_state_ = state.stamp;
   speed_ = state.spindle_speed;
   const bool steady = condition_ && condition_->kind == CuttingCondition::Kind::cut && state.connected &&
-                      state.feed > 0.0 && onSteadyPath(*condition_, state, parameters_.path_tolerance);
+                      state.feed > 0.0 && inSteadyCut(*condition_, state, parameters_.path_tolerance);
   if (!steady || gap) notSteady(state.stamp);
   if (!steady) return;
   if (!steady_since_) steady_since_ = state.stamp;
   steady_until_ = state.stamp;
+  if (feedTurns(*condition_)) notePosition(state);
   evaluate();
+}
+
+void ChatterDetector::notePosition(const CncState& state) {
+  constexpr std::size_t MOST = 1000;
+  const auto x = controllerAxis(state.axes, 0), y = controllerAxis(state.axes, 1);
+  if (!x || !y || std::max(*x, *y) >= state.position.size()) return;
+  positions_.push_back({state.stamp, state.position[*x], state.position[*y]});
+  if (positions_.size() > MOST) positions_.pop_front();
+}
+
+/// [rad/s] at which the feed turns, counterclockwise, by least squares over the directions from state to
+/// state; empty: fewer than three.
+std::optional<double> ChatterDetector::turnRate(double from, double to) const {
+  constexpr double LEAST_WAY = 2e-5;  // [m] ten increments of a noisy position
+  constexpr double AROUND = 0.03;     // [s] one state before and after
+  std::vector<double> times, directions;
+  const Position* last = nullptr;
+  for (const Position& here : positions_) {
+    if (here.time < from - AROUND || here.time > to + AROUND) continue;
+    if (!last) last = &here;
+    if (std::hypot(here.x - last->x, here.y - last->y) < LEAST_WAY) continue;
+    double direction = std::atan2(here.y - last->y, here.x - last->x);
+    if (!directions.empty())
+      direction = directions.back() + std::remainder(direction - directions.back(), units::TWO_PI);
+    times.push_back(0.5 * (here.time + last->time));
+    directions.push_back(direction);
+    last = &here;
+  }
+  if (times.size() < 3) return std::nullopt;
+  const double n = static_cast<double>(times.size());
+  const double time = std::accumulate(times.begin(), times.end(), 0.0) / n;
+  double squares = 0.0, product = 0.0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    squares += (times[i] - time) * (times[i] - time);
+    product += (times[i] - time) * directions[i];
+  }
+  return product / squares;
 }
 
 void ChatterDetector::handle(const SpindleAngle& angle) {
@@ -237,18 +280,36 @@ std::vector<double> ChatterDetector::forceAt(const std::vector<double>& times, s
 }
 
 void ChatterDetector::judge(double from, double to) {
-  const double start = timeAt(from), stop = timeAt(to);
-  const double period = (stop - start) / parameters_.revolutions;
+  const bool turning = feedTurns(*condition_);
+  const double start = timeAt(from);
+  const std::optional<double> turn_rate = turning ? turnRate(start, timeAt(to)) : 0.0;
+  if (!turn_rate) return;
+  // Against the feed a revolution may be longer than that of the spindle.
+  const auto turns = static_cast<std::size_t>(parameters_.revolutions - (turning ? 1 : 0));
+  const auto timeOf = [&](double angle) {  // to the feed
+    double time = timeAt(angle);
+    for (int k = 0; turning && k < 3; ++k) time = timeAt(angle - *turn_rate * (time - start));
+    return time;
+  };
+  const double stop = timeOf(from + units::TWO_PI * static_cast<double>(turns));
+  const double period = (stop - start) / static_cast<double>(turns);
   const double rate =
       static_cast<double>(samples_.size() - 1) / (samples_.back().time - samples_.front().time);
   if (!(period * rate >= 8.0)) return;  // fewer samples in a revolution do not resolve harmonics
   const auto bins = static_cast<std::size_t>(std::ceil(period * rate));
-  const auto turns = static_cast<std::size_t>(parameters_.revolutions);
   std::vector<double> times;
   for (std::size_t i = 0; i < bins * turns; ++i)
-    times.push_back(timeAt(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins)));
+    times.push_back(timeOf(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins)));
+  std::array<std::vector<double>, 3> force;
+  for (std::size_t axis = 0; axis < 3; ++axis) force[axis] = forceAt(times, axis, rate);
+  for (std::size_t i = 0; turning && i < times.size(); ++i) {
+    const std::complex<double> in_feed =
+        std::complex<double>(force[0][i], force[1][i]) * std::polar(1.0, -*turn_rate * (times[i] - start));
+    force[0][i] = in_feed.real();
+    force[1][i] = in_feed.imag();
+  }
   RevolutionWindow window(bins, turns, condition_->tool.teeth);
-  for (std::size_t axis = 0; axis < 3; ++axis) window.add(forceAt(times, axis, rate));
+  for (const std::vector<double>& axis : force) window.add(axis);
   const ChatterEvidence evidence = criterion_.judge(window, period);
 
   ChatterState state;

@@ -181,13 +181,15 @@ class RecordingAnalysis {
   }
 
   RecordingVerdict run() {
-    const Background background = this->background();
-    idle_level_ = background.level;
-    for (const double start : startsWithin(true)) {
-      const RevolutionWindow window = windowAt(channels_, start);
+    const std::vector<RevolutionWindow> windows = windowsAt(channels_, startsWithin(true));
+    const Level cut = meanOf(windows);
+    const Level background = this->background();
+    idle_level_ = background.total;
+    const std::vector<double> lines = withoutCut(background, cut);
+    for (const RevolutionWindow& window : windows) {
       addOrders(window);
       level_ += window.total();
-      add(criterion_.judge(window, period_, background.power));
+      add(criterion_.judge(window, period_, lines));
     }
     return verdict();
   }
@@ -225,33 +227,41 @@ class RecordingAnalysis {
     return starts;
   }
 
-  RevolutionWindow windowAt(const std::vector<std::vector<double>>& channels, double start) const {
-    RevolutionWindow window(static_cast<std::size_t>(std::ceil(revolution_)), turns_, teeth_);
-    for (const std::vector<double>& channel : channels) window.add(channel, start, revolution_);
-    return window;
+  std::vector<RevolutionWindow> windowsAt(const std::vector<std::vector<double>>& channels,
+                                          const std::vector<double>& starts) const {
+    std::vector<RevolutionWindow> windows;
+    for (const double start : starts) {
+      windows.emplace_back(static_cast<std::size_t>(std::ceil(revolution_)), turns_, teeth_);
+      for (const std::vector<double>& channel : channels) windows.back().add(channel, start, revolution_);
+    }
+    return windows;
   }
 
   /// Mean over windows.
-  struct Background {
-    std::vector<double> power;  // of each line; empty without windows
-    double level = 0.0;         // variance
+  struct Level {
+    std::vector<double> lines;  // power of each line of the remainder; empty without windows
+    double total = 0.0;         // variance
+    double teeth = 0.0;         // power of the tooth passing harmonics
   };
-  Background meanOf(const std::vector<std::vector<double>>& channels,
-                    const std::vector<double>& starts) const {
-    Background mean;
-    const auto windows = static_cast<double>(starts.size());
-    for (const double start : starts) {
-      const RevolutionWindow window = windowAt(channels, start);
-      mean.power.resize(window.power().size(), 0.0);
-      for (std::size_t k = 0; k < mean.power.size(); ++k) mean.power[k] += window.power()[k] / windows;
-      mean.level += window.total() / windows;
+  Level meanOf(const std::vector<RevolutionWindow>& windows) const {
+    Level mean;
+    const auto n = static_cast<double>(windows.size());
+    for (const RevolutionWindow& window : windows) {
+      mean.lines.resize(window.power().size(), 0.0);
+      for (std::size_t k = 0; k < mean.lines.size(); ++k) mean.lines[k] += window.power()[k] / n;
+      mean.total += window.total() / n;
+      const auto teeth = static_cast<std::size_t>(teeth_);
+      for (std::size_t k = teeth; k < window.ofOrder().size(); k += teeth)
+        mean.teeth += window.ofOrder()[k] / n;
     }
     return mean;
   }
 
   /// Of the idle spindle, where it is recorded, or else of the windows outside the cut.
-  Background background() const {
-    if (idle_.empty()) return meanOf(channels_, cut_.hasAir() ? startsWithin(false) : std::vector<double>());
+  Level background() const {
+    if (idle_.empty())
+      return meanOf(cut_.hasAir() ? windowsAt(channels_, startsWithin(false))
+                                  : std::vector<RevolutionWindow>());
     const double length = revolution_ * static_cast<double>(turns_);
     std::vector<double> starts;
     for (double start = 1.0; start + length + 3.0 < static_cast<double>(idle_[0].size());
@@ -260,7 +270,20 @@ class RecordingAnalysis {
     if (starts.empty())
       throw Error(formatted("idle recording: %zu samples: expected at least the %zu revolutions of a window",
                             idle_[0].size(), turns_));
-    return meanOf(idle_, starts);
+    return meanOf(windowsAt(idle_, starts));
+  }
+
+  /// Lines of the background that are not those of a part of the cut in it (a tool that leaves the cut for
+  /// less than a window): such a part has the tooth passing harmonics of the cut as well. A line that is as
+  /// strong outside the cut keeps half its power at least, every line LEAST of it.
+  static std::vector<double> withoutCut(const Level& background, const Level& cut) {
+    constexpr double MOST = 0.5, LEAST = 0.05;  // [1]
+    std::vector<double> lines = background.lines;
+    if (!(cut.teeth > 0.0)) return lines;
+    const double part = std::min(MOST, background.teeth / cut.teeth);
+    for (std::size_t k = 0; k < std::min(lines.size(), cut.lines.size()); ++k)
+      lines[k] = std::max(LEAST * lines[k], lines[k] - part * cut.lines[k]);
+    return lines;
   }
 
   static std::vector<double> scaled(std::vector<double> channel, double unit) {

@@ -81,14 +81,18 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                  [this](const ChatterState& state) { handle(state); }),
       advisor_(
           parameters_.chart.speed_low, maker_.highestSpeed(), maker_.teeth(),
-          [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
+          [this](const CuttingCondition& condition) {
+            return maker_.hasTool(condition) ? maker_.system(condition.engagement) : std::nullopt;
+          },
           [this](const ChatterAdvice& advice) { publish(advice); },
           [this](const ChatterAdvice& advice) {
             control_.handle(advice);
             override();
           }),
       control_(parameters_.control, parameters_.chatter.revolutions,
-               [this](const Engagement& engagement) { return maker_.uncertainSystem(engagement); }),
+               [this](const Engagement& engagement) {
+                 return other_tool_.empty() ? maker_.uncertainSystem(engagement) : std::nullopt;
+               }),
       chart_(nh.advertise<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 1, true)),
       chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE, true)),
       advice_(nh.advertise<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, 10, true)),
@@ -121,6 +125,7 @@ void StabilityNode::listen() {
   inputs.on<smartmill_msgs::CuttingCondition>(
       names::CUTTING_CONDITION, [this](const smartmill_msgs::CuttingCondition& message, double) {
         const CuttingCondition condition = fromMsg(message);
+        if (condition.tool.teeth > 0) other_tool_ = maker_.hasTool(condition) ? "" : condition.tool_name;
         advisor_.handle(condition);
         detection_.push(condition);
         control_.handle(condition);
@@ -369,6 +374,9 @@ void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& s
   } else {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "chart published, by " + maker_.solver());
   }
+  if (!other_tool_.empty())
+    status.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
+                        "the tool in use, '" + other_tool_ + "', is not that of the chart");
   if (!bistable_problem_.empty()) status.add("limits for the force curve", bistable_problem_);
 }
 

@@ -79,6 +79,7 @@ class StabilityNode {
   Streams streams_{*this};
   std::string chart_problem_;  // error of the last chart
   ChatterState last_state_;
+  std::string other_tool_;  // in use; empty: that of the model
 
   ros::Publisher chart_, chatter_, advice_, bistable_;
   ros::ServiceServer predict_;

@@ -158,7 +158,7 @@ class Contact {
     };
     for (const EdgeSlice& whole : edgeSlices(tool, depth)) {
       if (!whole.curved || whole.low >= depth) break;
-      const EdgeSlice slice = depth < whole.high ? upTo(depth, whole, tool) : whole;
+      const EdgeSlice slice = between(whole.low, std::min(depth, whole.high), whole, tool);
       add(slice.low, slice.high, slice.chip_radial, slice.chip_axial, slice.inset);
     }
     if (depth <= corner) return;

@@ -376,7 +376,9 @@ double RegenerativeSystem::meanRadial(double depth) const {
   const double corner = std::min(depth, cornerHeight(tool()));
   double sine = 0.0, cosine = 0.0;  // [m] integrals over the height
   if (corner > 0.0) {
-    const EdgeSlice slice = upTo(corner, EdgeSlice{}, tool());
+    EdgeSlice whole;
+    whole.curved = true;
+    const EdgeSlice slice = between(0.0, corner, whole, tool());
     sine = corner * slice.chip_radial;
     cosine = corner * slice.chip_axial;
   }

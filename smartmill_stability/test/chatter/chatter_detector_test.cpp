@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <type_traits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability_testing/cutting_scene.h"
@@ -150,6 +152,66 @@ TEST(ChatterDetector, withoutAnAngleTheHarmonicsDecide) {
   // Two seconds less 4 revolutions of settling, windows of 0.8 s by half.
   EXPECT_GE(chattering, 2);
   EXPECT_GE(stable, 2);
+}
+
+// Around a circle of 10 mm at 20 mm/s: the force of the teeth turns with the feed, with and without chatter.
+TEST(ChatterDetector, aTurningFeedIsNoChatter) {
+  constexpr double RATE = 10000.0, RADIUS = 10e-3, FEED = 20e-3;
+  const double speed = units::radPerSecFromRpm(4500.0);
+  ToolGeometry tool;
+  tool.teeth = 3;
+  tool.diameter = 16e-3;
+  tool.helix = 0.5;
+  const MechanisticForce cut(tool, {800e6, 250e6, 100e6, 20e3, 20e3, 1e3}, {1.5, units::PI, 3e-3, 0.1e-3});
+  for (const double sense : {1.0, -1.0}) {
+    for (const double chatter : {0.0, 120.0}) {
+      std::vector<ChatterState> verdicts;
+      ChatterDetector detector(ChatterParameters(), [&](const ChatterState& state) {
+        if (state.valid) verdicts.push_back(state);
+      });
+      CuttingCondition condition;
+      condition.kind = CuttingCondition::Kind::cut;
+      condition.name = "ring";
+      condition.tool = tool;
+      condition.steady_to = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+      detector.handle(condition);
+      ForceBlock block;
+      block.sample_rate = RATE;
+      for (int k = 0; k < 15000; ++k) {
+        const double time = k / RATE, turned = sense * FEED / RADIUS * time;  // of the feed from +x
+        const CuttingForce force = cut.at(speed * time + turned);
+        const std::complex<double> in_machine =
+            std::complex<double>(force.fx, force.fy) * std::polar(1.0, turned) +
+            chatter * std::sin(units::TWO_PI * 1107.0 * time);
+        block.force[0].push_back(in_machine.real());
+        block.force[1].push_back(in_machine.imag());
+        block.force[2].push_back(force.fz);
+        if (k % 50 == 0) detector.handle(SpindleAngle{time, std::fmod(speed * time, units::TWO_PI), speed});
+        if (k % 200 == 0) {
+          CncState state;
+          state.stamp = time;
+          state.connected = true;
+          state.axes = {"X", "Y", "Z"};
+          state.position = {RADIUS * std::sin(sense * turned), sense * RADIUS * (1.0 - std::cos(turned)),
+                            0.0};
+          state.feed = FEED;
+          detector.handle(state);
+        }
+        if (block.force[0].size() < 100) continue;
+        detector.handle(block);
+        block.first_index += 100;
+        block.stamp = (k + 1) / RATE;
+        for (auto& axis : block.force) axis.clear();
+      }
+      ASSERT_GT(verdicts.size(), 5u);
+      for (const ChatterState& verdict : verdicts) {
+        EXPECT_EQ(verdict.chatter, chatter > 0.0) << verdict.energy_ratio;
+        if (chatter == 0.0) {
+          EXPECT_LT(verdict.energy_ratio, 0.005);
+        }
+      }
+    }
+  }
 }
 
 TEST(SignalBlock, hasUpToThreeChannels) {

@@ -187,6 +187,36 @@ TEST(SoundListener, eachTryImprovesTheAdviceUntilACutIsStable) {
   EXPECT_EQ(shop.state().advice.used, std::vector<bool>(3, true));
 }
 
+// A tool that touches the part, leaves it for less than a window and cuts: what is outside the cut contains
+// a part of it. A tone of another machine is in the background all the same.
+TEST(SoundListener, aShortPauseInACutIsNoBackground) {
+  for (const double touch : {0.15, 0.2, 0.25}) {
+    for (const double pause : {0.2, 0.3}) {
+      Workshop shop(parameters());
+      shop.idle(2.0);
+      shop.cut(touch, RPM, {873.0});
+      shop.idle(pause);
+      shop.cut(2.5, RPM, {873.0});
+      shop.idle(1.5);
+      ASSERT_FALSE(shop.state().tries.empty()) << touch << " s, " << pause << " s";
+      const SoundTry& heard = shop.state().tries.back();
+      EXPECT_EQ(heard.kind, Kind::chatter) << touch << " s, " << pause << " s: " << heard.text;
+    }
+  }
+  Workshop shop(parameters());
+  const Tone pump{873.0, 8.0};
+  std::vector<Tone> air{pump}, cut{pump};
+  for (int k : {1, 3, 5}) air.push_back({k * RPM / 60.0, 1.0});
+  for (int k = 1; k <= 5; ++k) cut.push_back({k * TEETH * RPM / 60.0, 12.0 / k});
+  shop.play(2.0, air);
+  shop.play(0.2, cut, 1.5);
+  shop.play(0.2, air);
+  shop.play(2.5, cut, 1.5);
+  shop.play(1.5, air);
+  ASSERT_FALSE(shop.state().tries.empty());
+  EXPECT_EQ(shop.state().tries.back().kind, Kind::stable) << shop.state().tries.back().text;
+}
+
 // A spindle that starts, coolant, a bang: none is a try; their level is then that of the air.
 TEST(SoundListener, whatIsNoCutIsNoTry) {
   Workshop shop(parameters());
@@ -324,9 +354,9 @@ TEST(SoundListener, withoutARangeTheSpeedsAreAroundTheFirst) {
   ASSERT_EQ(shop.state().tries.size(), 1u);
   EXPECT_NEAR(units::rpmFromRadPerSec(shop.state().tries[0].speed), RPM, 6.0);
   ASSERT_FALSE(shop.state().advice.speeds.empty());
-  for (const SpeedProposal& p : shop.state().advice.speeds) {
-    EXPECT_GT(units::rpmFromRadPerSec(p.speed), 0.499 * RPM);
-    EXPECT_LT(units::rpmFromRadPerSec(p.speed), 2.001 * RPM);
+  for (const SpeedProposal& proposal : shop.state().advice.speeds) {
+    EXPECT_GT(units::rpmFromRadPerSec(proposal.speed), 0.499 * RPM);
+    EXPECT_LT(units::rpmFromRadPerSec(proposal.speed), 2.001 * RPM);
   }
 }
 

@@ -113,7 +113,7 @@ TEST(EdgeShape, theLeastLimitOfAFaceMillScalesWithItsRadialCoefficient) {
     const double mean = teeth / TWO_PI * across * 0.5 * PI;  // cos^2 over half a revolution
     const double closed = 2.0 * k * z * (1.0 + z) / mean;
     double least = 1.0;
-    for (double rpm = 2400.0; rpm < 3200.0; rpm += 5.0)
+    for (double rpm = 2500.0; rpm < 3000.0; rpm += 5.0)
       least = std::min(least, limitOf(system, rpm, Method::zero_order));
     EXPECT_NEAR(least / closed, 1.0, 1e-3) << deg;
     EXPECT_GE(least / closed, 1.0 - 1e-5) << deg;
@@ -151,11 +151,11 @@ TEST(EdgeShape, methodsAgree) {
   setHelix(varied, {25.0, 35.0, 25.0, 35.0});
   SolverOptions fine;
   fine.nodes = 20;
-  fine.steps = 400;
+  fine.steps = 200;
   for (const RegenerativeSystem& system : {bull, ball, varied}) {
     const double limit = limitOf(system, 9000.0);
     EXPECT_NEAR(limitOf(system, 9000.0, Method::collocation, fine) / limit, 1.0, 1e-4);
-    EXPECT_NEAR(limitOf(system, 9000.0, Method::semi_discretization, fine) / limit, 1.0, 5e-3);
+    EXPECT_NEAR(limitOf(system, 9000.0, Method::semi_discretization, fine) / limit, 1.0, 3e-3);
     EXPECT_NEAR(limitOf(system, 9000.0, Method::multi_frequency) / limit, 1.0, 3e-3);
   }
 }

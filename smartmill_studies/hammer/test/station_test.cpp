@@ -160,7 +160,7 @@ TEST(Station, ATurnedStationGivesTheReceptancesAlongTheMachine) {
     return std::sqrt(off / all);
   };
   double aligned = 0.0;
-  for (const double turn : {0.0, 45.0, -30.0}) {
+  for (const double turn : {0.0, -30.0}) {
     const double half = 0.5 * units::radFromDeg(turn);
     for (MachineModel* model : {&drawn.true_model, &drawn.believed})
       model->frames["hammer"] = {"machine", {}, {{0.0, 0.0, std::sin(half), std::cos(half)}}};

@@ -68,7 +68,7 @@ TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
   const Faults faults;
   std::vector<double> errors;
   Coverage ktc;
-  const int count = 72;
+  const int count = Coverage::FEW;
   for (int i = 0; i < count; ++i) {
     const CaseErrors e = judge(drawCase(static_cast<unsigned>(1000 + i), faults), faults);
     errors.push_back(std::abs(e.ktc));
@@ -77,7 +77,7 @@ TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[count / 2], 0.03);
   EXPECT_LT(errors[static_cast<std::size_t>(0.95 * count)], 0.06);
-  EXPECT_TRUE(ktc.isCalibrated(0.0, 2.0));
+  EXPECT_TRUE(ktc.isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
 }
 
 }  // namespace

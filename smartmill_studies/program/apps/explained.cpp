@@ -53,7 +53,7 @@ Campaign producedCampaign(const MachineModel& machine, const MachineModel& nomin
     for (const SpindleAngle& angle : block.angle) segments.push(angle);
   };
   const MachinedPart part =
-      machinePart(machine, nominal, text, preparedPart(text, model_file, nominal), seed, streams);
+      machinePart(machine, nominal, text, preparedPart(text, {model_file}, nominal), seed, streams);
   segments.flush();
   (*line)["tests"] =
       campaign.write(nominal, discrepancy::LiveGapOptions(), folder, [](const std::string&) {});

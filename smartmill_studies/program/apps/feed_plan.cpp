@@ -56,7 +56,9 @@ double twinPeak(const MachineModel& model, const Step& step) {
   sim::ToolMotion motion;
   motion.speed = move.spindle_speed;
   motion.velocity = {feed, 0.0};
-  process.engage(step.contact.arcs, motion);
+  std::vector<ContactArc> arcs;  // of a flat end mill
+  for (const program::EngagedArc& arc : step.contact.arcs) arcs.push_back({arc.entry, arc.exit, arc.top});
+  process.engage(arcs, motion);
   double peak = 0.0;
   for (int k = 0; k < REVOLUTIONS * STEPS; ++k) {
     motion.angle = units::TWO_PI * k / STEPS;

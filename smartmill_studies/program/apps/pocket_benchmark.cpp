@@ -43,7 +43,8 @@ void simulatePocket(benchmark::State& state) {
   double machining = 0.0;
   for (auto _ : state) {
     ToolModels models({file});
-    Stock stock({{0, 0, -20 * MM}, {120 * MM, 80 * MM, 0}}, static_cast<double>(state.range(1)) * units::UM);
+    Stock stock(StockBlock{{0, 0, -20 * MM}, {120 * MM, 80 * MM, 0}},
+                static_cast<double>(state.range(1)) * units::UM);
     machining +=
         ProgramAnalysis("pocket", models, stock, options).run(interpretProgram(pocket, "pocket")).time;
   }

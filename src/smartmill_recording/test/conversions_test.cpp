@@ -170,9 +170,10 @@ TEST(Conversions, CuttingCondition) {
   c.tool.diameter = 12e-3;
   c.tool.helix = 0.5;
   c.tool.edge.corner_radius = 1e-3;
+  c.tool.pitch = {1.5, 1.6, 1.5, 1.6831853071795862};
   c.tool.edge.edge_angle = 1.2;
   c.cut_time_before = 240.0;
-  c.engagement = {0.1, 3.0, 2e-3, 0.05e-3};
+  c.engagement = {0.1, 3.0, 2e-3, 0.05e-3, {{0.1, 2.9, 0.0, 1e-3}, {0.2, 3.0, 1e-3, 2e-3}}};
   c.spindle_speed = 900.0;
   c.steady_from = {1.0, 2.0, 3.0};
   c.steady_to = {4.0, 5.0, 6.0};
@@ -186,6 +187,10 @@ TEST(Conversions, CuttingCondition) {
   EXPECT_EQ(again.tool.diameter, 12e-3);
   EXPECT_EQ(again.tool.helix, 0.5);
   EXPECT_EQ(again.tool.edge.corner_radius, 1e-3);
+  EXPECT_EQ(again.tool.pitch, c.tool.pitch);
+  ASSERT_EQ(again.engagement.bands.size(), 2u);
+  EXPECT_EQ(again.engagement.bands[1].entry, 0.2);
+  EXPECT_EQ(again.engagement.bands[1].top, 2e-3);
   EXPECT_EQ(again.tool.edge.edge_angle, 1.2);
   EXPECT_EQ(again.cut_time_before, 240.0);
   EXPECT_EQ(again.engagement.entry, 0.1);

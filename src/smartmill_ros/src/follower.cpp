@@ -18,6 +18,8 @@ using Request = smartmill_msgs::Follow::Request;
 constexpr double POLL = 0.02;  // [s] without progress
 /// Answers of every node after which messages in sockets, threads and queues are delivered.
 constexpr int ROUNDS = 5;
+/// The same after a step: a message that is still in a socket belongs to the next one.
+constexpr int STEP_ROUNDS = 1;
 
 /// [1] publishers of each topic, registered at the master.
 std::map<std::string, std::uint32_t> registeredPublishers() {
@@ -162,9 +164,14 @@ void Followers::keepUp(std::uint64_t max_behind) {
 }
 
 void Followers::settle() {
+  settle(ROUNDS);
+}
+
+// @param rounds without a processed message
+void Followers::settle(int rounds) {
   keepUp(0);
   std::uint64_t previous = updateCounts();
-  for (int round = 0; round < ROUNDS; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const std::uint64_t taken = updateCounts();
     if (taken != previous) round = -1;
     previous = taken;
@@ -172,7 +179,7 @@ void Followers::settle() {
 }
 
 void Followers::step() {
-  settle();
+  settle(STEP_ROUNDS);
   for (Node& node : nodes_) call(node, Request::STEP);
 }
 

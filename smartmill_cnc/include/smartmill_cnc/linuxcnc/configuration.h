@@ -14,9 +14,10 @@ constexpr const char* BEAT_SIGNAL = "beat";              ///< bit: toggles while
 constexpr const char* LOAD_SIGNAL = "load";              ///< float: spindle load, 1 is full scale
 constexpr const char* FEED_SIGNAL = "adaptive_feed";     ///< float: input of motion.adaptive-feed (M52)
 constexpr const char* SPINDLE_SIGNAL = "spindle_scale";  ///< float: factor on spindle.0.speed-out
-constexpr const char* SAMPLER_PINS = "fffffffff";
+constexpr const char* SAMPLER_PINS = "fffffffffs";
 
 struct ConfigurationOptions {
+  int tools = 20;  ///< T1 to this number are in the tool table, with length 0: positions are those of the tip
   double speed_tolerance = 10.0;  ///< [rpm] of a spindle at speed, in addition to 1 %
   double limit_margin = 1e-3;  ///< [mm] of the limits: a home at the end of travel may round to either side
   double standstill = 0.5;     ///< [rpm] of a spindle at rest

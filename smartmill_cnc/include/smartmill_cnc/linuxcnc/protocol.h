@@ -13,7 +13,7 @@
 /// message, whose length is bounded by its kind. Invalid frames throw Error; their connection is closed.
 namespace smartmill::cnc::linuxcnc {
 
-constexpr std::uint8_t PROTOCOL_VERSION = 2;
+constexpr std::uint8_t PROTOCOL_VERSION = 3;
 constexpr std::size_t FRAME_HEADER = 8;           ///< [byte]
 constexpr std::size_t LONGEST_PROGRAM = 1 << 20;  ///< [byte]
 constexpr std::size_t LONGEST_TEXT = 4096;        ///< [byte] of any other text
@@ -88,6 +88,7 @@ struct ServoSample {
   double distance_to_go = 0.0;       ///< [m] of the move
   double spindle_load = 0.0;         ///< [1] of full scale, from the drive or its replacement (SetLoad)
   double marker = 0.0;               ///< line of the program's move (M67 E0)
+  double tool = 0.0;                 ///< T of the tool in the spindle; 0: none
 };
 
 /// Published by the stream: samples first, first + 1, ... of the controller's count.

@@ -34,13 +34,17 @@ struct LiveGap {
   std::vector<double> gap;  ///< [1] RMS of (measured - simulated) over noise; 1 is the noise floor
   Record simulated;         ///< simulated sensor output; empty if the segment was not compared
   bool model_fits = true;   ///< no gap is above the limit
-  std::string exclusion;    ///< reason why the segment was not compared (chatter); empty if it was
+  std::string
+      exclusion;  ///< reason why the segment was not compared (chatter, another tool); empty if it was
   bool near_limit = false;  ///< too close to the stability limit for the coarse twin of explain
 };
 
 /// Model of the twin whose forces are compared. With compensated ones its force sensor is ideal and shows the
 /// force on the tool in the machine's axes, with the noise of the model's.
 MachineModel comparedModel(MachineModel model, ComparedForce compared);
+
+/// Whether a cut was made with another tool than that of the model, which says nothing about it.
+bool hasOtherTool(const RecordSegment& segment, const MachineModel& model);
 
 /// Gap of one segment. fx, fy, fz are compared sample by sample (only the second half if the segment states
 /// no running_before). load_meter is compared if the model has a spindle with its full scale and the segment

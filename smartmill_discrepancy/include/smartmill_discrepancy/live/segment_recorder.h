@@ -26,7 +26,8 @@ struct RecordSegment {
   /// In cut throughout: running_before is stated. start_time counts from the first input. cut_time_before
   /// is that of the condition; without it the steady cutting time since the first input.
   CampaignTest test;
-  Record record;  ///< time, spindle_angle, fx, fy, fz
+  ToolGeometry tool;  ///< as the condition states it
+  Record record;      ///< time, spindle_angle, fx, fy, fz
   std::vector<LoadMeasurement> load;
 };
 

@@ -80,7 +80,7 @@ class CompensationPipeline {
   void flush();
 
  private:
-  void handle(const SampleBlock& channels, const SampleBlock& block);
+  void handle(const SampleBlock& block);
   void restart();
   ForceOutputs checkedOutputs();
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,13 @@
 #include "smartmill_loadmeter/motor/self_calibration.h"
 
 namespace smartmill::loadmeter {
+
+/// Mean force of a cut.
+struct MeanForce {
+  std::array<std::optional<Estimate>, 3> axis;  ///< [N] X, Y, Z on the tool, without the error of the gain
+  double gain_error = 0.0;                      ///< [1] standard deviation, common to all cuts
+  bool any() const { return axis[0] || axis[1] || axis[2]; }
+};
 
 /// Force of each cut: by calibrated motors, and by all measurements together.
 class CutForces {
@@ -38,6 +46,9 @@ class CutForces {
   std::optional<ForceEstimate> estimate(const LoadTest& cut, const std::optional<Estimate>& torque,
                                         const std::vector<LoadTest>& air_cuts,
                                         bool without_motors = false) const;
+  /// [N] Mean force of a straight cut in the machine's axes, by a force sensor or else by calibrated motors;
+  /// empty where nothing measures it.
+  MeanForce meanForce(const LoadTest& cut, const std::vector<LoadTest>& air_cuts) const;
   /// Adds a test to the self-calibration, if enabled.
   void calibrate(const LoadTest& test, const std::optional<Estimate>& torque,
                  const std::vector<LoadTest>& air_cuts);

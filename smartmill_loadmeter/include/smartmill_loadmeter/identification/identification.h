@@ -61,9 +61,11 @@ class LoadMeterIdentification {
   /// Returns to the initial state (a bag was restarted).
   void reset();
 
-  /// Running estimate of Ktc and Kte since the last change of tool or material; empty before a cut with known
+  /// Running estimate of Ktc and Kte of the last cut's tool and material; empty before a cut with known
   /// friction.
   const std::optional<RecursiveCoefficients>& production() const { return production_.estimate(); }
+
+  const std::string& productionTool() const { return production_.tool(); }
 
   const std::vector<LoadTest>& airCuts() const { return session_.air_cuts; }
   const std::vector<LoadTest>& cuts() const { return session_.cuts; }

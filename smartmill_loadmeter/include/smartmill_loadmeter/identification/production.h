@@ -24,7 +24,8 @@ struct TorqueMeasurement {
 /// for any engagement) with exponential forgetting in cutting time, so that it follows wear. Directions
 /// without excitation (one feed only) return to the initial uncertainty, not beyond. The standard deviations
 /// allow for a drift within the memory; for constant coefficients they are up to sqrt(2) times the errors. A
-/// common error of the torques moves the estimate, and is not reduced by more cuts.
+/// common error of the torques moves the estimate, and is not reduced by more cuts. Torques that contradict
+/// each other by more than their standard deviations (misfit()) increase those of the coefficients.
 class RecursiveCoefficients {
  public:
   struct Start {
@@ -44,16 +45,21 @@ class RecursiveCoefficients {
   double covariance() const;  ///< of the two
   /// Normalised innovation of the last measurement: beyond 3 the cut contradicts the estimate.
   double normalisedInnovation() const { return innovation_; }
+  /// [1] RMS of the normalised innovations, and 1 where 99 % of sets without contradiction scatter as much:
+  /// the factor of the independent part of the standard deviations (Birge ratio).
+  double misfit() const;
   int readings() const { return readings_; }
 
  private:
   std::array<double, 2> common() const;
+  std::array<double, 2> independent() const;
 
   std::array<double, 2> value_;
   std::array<double, 3> information_{}, start_{};  // xx, xy, yy
   std::array<double, 2> pull_{};                   // information times the shift by one common deviation
   double memory_;
   double innovation_ = 0.0;
+  double squares_ = 0.0, weight_ = 0.0;  // [1] of the innovations and their number, with forgetting
   int readings_ = 0;
 };
 

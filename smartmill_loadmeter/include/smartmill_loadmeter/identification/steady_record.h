@@ -13,7 +13,8 @@
 namespace smartmill::loadmeter {
 
 /// Steady part of the present test: samples in an air cut at steady speed, and in a cut while the tool moves
-/// between steady_from and steady_to, in both cases after the load meter has settled.
+/// between steady_from and steady_to or, where the feed turns, during the test, in all cases after the load
+/// meter has settled. Where the feed turns, force and motors have no mean and are not recorded.
 class SteadyRecord {
  public:
   enum class Reading { ignored, steady, not_finite };

@@ -31,7 +31,8 @@ struct JointResult {
 
 /// All six coefficients from torque and the forces of moving axes together, weighted by their standard
 /// deviations; coefficients that the data do not determine are listed.
+/// @param gain_error [1] standard deviation of a gain that all axis forces have in common, an unknown as well
 /// @throws Error when none is observable.
-JointResult identifyJointly(const std::vector<JointMeasurement>& measurements);
+JointResult identifyJointly(const std::vector<JointMeasurement>& measurements, double gain_error = 0.0);
 
 }  // namespace smartmill::loadmeter

@@ -8,6 +8,7 @@
 #include "smartmill_program/engagement/contact.h"
 #include "smartmill_program/nc/move.h"
 #include "smartmill_program/stock/stock.h"
+#include "smartmill_program/stock/tool_shape.h"
 
 namespace smartmill::program {
 
@@ -19,8 +20,9 @@ struct Step {
   double time = 0.0;                             ///< [s]
   double feed_angle = 0.0;  ///< [rad] of the horizontal feed direction from +x of the machine
   double feed_share = 0.0;  ///< [1] horizontal part of the feed: 1 level, 0 along the tool axis
-  Contact contact;          ///< of the side of the tool
-  double side_volume = 0.0, face_volume = 0.0;  ///< [m3] removed by the side and by the end face of the tool
+  Contact contact;          ///< of the edges with the horizontal feed
+  double side_volume = 0.0, face_volume = 0.0;  ///< [m3] removed by the feed across and along the tool axis
+  bool holder_hit = false;                      ///< whether the holder meets material
 
   double volume() const { return side_volume + face_volume; }
   bool air() const { return volume() <= 0.0; }
@@ -37,12 +39,12 @@ struct SimulationOptions {
 /// Runs moves through a stock, step by step.
 class CutSimulation {
  public:
-  /// [m] radius of a tool by its number. May throw.
-  using Radius = std::function<double(int tool)>;
+  /// Shape of a tool by its number. May throw.
+  using Tool = std::function<const ToolShape&(int tool)>;
   /// Called after each step. @return false: the simulation ends.
   using Visit = std::function<bool(const Step&)>;
 
-  CutSimulation(Stock& stock, const Radius& radius, const SimulationOptions& options = {});
+  CutSimulation(Stock& stock, const Tool& tool, const SimulationOptions& options = {});
 
   /// Arcs in G18 and G19 are replaced by chords within a micrometre.
   /// @return false when the visitor ended it. @throws Error on a cut with the spindle at rest
@@ -50,10 +52,10 @@ class CutSimulation {
 
  private:
   bool runPath(const Move& move, const nc::PathSegment& path, const Visit& visit);
-  Step step(const Move& move, double from, double to, double radius);
+  Step step(const Move& move, double from, double to, const ToolShape& tool);
 
   Stock& stock_;
-  Radius radius_;
+  Tool tool_;
   SimulationOptions options_;
 };
 

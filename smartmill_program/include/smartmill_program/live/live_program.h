@@ -14,10 +14,11 @@
 
 namespace smartmill::program {
 
-/// Part of a program in which the load of the spindle is constant: a cut along a line with one arc of
-/// contact, or moves and dwells in air while the spindle turns.
+/// Part of a program in which the load of the spindle is constant: a level cut along a line or around a
+/// circle with one arc of contact, or moves and dwells in air while the spindle turns.
 struct SteadyStretch {
   bool cut = false;
+  bool turns = false;                         ///< a cut along arcs of one circle
   double begin = 0.0, end = 0.0;              ///< [m] places on the path between which the load is constant
   double steady_from = 0.0, steady_to = 0.0;  ///< [m] the same without the margins
   nc::PathSegment::Point from{}, to{};        ///< [m] of a cut: tool tip at steady_from and steady_to

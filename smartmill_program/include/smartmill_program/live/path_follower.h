@@ -9,15 +9,11 @@
 #include <vector>
 
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_program/live/condition_names.h"
 #include "smartmill_program/live/follower_parameters.h"
 #include "smartmill_program/live/live_program.h"
 
 namespace smartmill::program {
-
-/// What conditions state in addition to the engagement.
-struct ConditionNames {
-  std::string tool, material;
-};
 
 /// Follows the tool along the path of a running program by the controller's states, and states the cutting
 /// condition of every steady stretch that it passes.

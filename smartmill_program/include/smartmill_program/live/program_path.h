@@ -23,6 +23,7 @@ class ProgramPath {
   const std::vector<Move>& moves() const { return moves_; }
   double begin(std::size_t move) const { return begin_[move]; }  ///< [m] place
   double length() const { return begin_.back(); }                ///< [m]
+  nc::PathSegment::Point at(double place) const;                 ///< [m] of the tool tip
   /// Places within a tolerance of a point, one for each passage of the path, in ascending order.
   /// @param point [m] of the tool tip @param from, to [m] part of the path that is searched
   /// @param tolerance [m]

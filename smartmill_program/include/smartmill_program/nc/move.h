@@ -7,13 +7,15 @@
 
 namespace smartmill::program {
 
+enum class FeedMode { inverse_time, per_minute, per_revolution };  ///< G93, G94, G95
+
 /// The F word in force.
 struct FeedWord {
-  double value = 0.0;           ///< as written, in units of the program
-  double unit = 0.0;            ///< [m/s] of one
-  bool per_revolution = false;  ///< G95
-  int line = 0;                 ///< that states it, from 1
-  std::size_t block = 0;        ///< executed block that states it
+  double value = 0.0;  ///< as written, in units of the program
+  double unit = 0.0;   ///< [m/s] of one
+  FeedMode mode = FeedMode::per_minute;
+  int line = 0;           ///< that states it, from 1
+  std::size_t block = 0;  ///< executed block that states it
 };
 
 /// A motion of the tool tip, or a dwell, with the modal state in which it is executed. Coordinates are those

@@ -11,9 +11,10 @@
 namespace smartmill::program {
 
 struct ReaderOptions {
-  /// [m] G54..G59 (0..5): position of its zero in the coordinates of the stock. The first work offset of a
-  /// program that is not listed is that of the stock; any other has to be listed.
-  std::map<int, std::array<double, 3>> work_offsets;
+  /// [m] "G54" .. "G59", "G59.1" .. "G59.3", "G54.1P1" ..: position of its zero in the coordinates of the
+  /// stock. The first work offset of a program that is not listed is that of the stock; any other has to be
+  /// listed.
+  std::map<std::string, std::array<double, 3>> work_offsets;
   /// [m] >= 0, D of G41 and G42; D0 is 0, any other that is not listed is the radius of the tool.
   std::map<int, double> radius_offsets;
   std::function<double(int tool)> tool_radius;  ///< [m] by the tool number. May throw; empty: unknown

@@ -63,7 +63,8 @@ class FeedPlanner {
   struct LineFeed {
     FeedBound bound;  // in units of the F word
     double old_low = FeedLimits::UNLIMITED, old_high = 0.0;
-    bool seen = false, per_revolution = false;
+    bool seen = false;
+    FeedMode mode = FeedMode::per_minute;
     bool stated = false;  // gets an F word of its own
     std::string number;   // of the F word
     double value = 0.0;

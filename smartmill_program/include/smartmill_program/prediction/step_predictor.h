@@ -9,6 +9,7 @@
 #include "smartmill_program/prediction/force_predictor.h"
 #include "smartmill_program/prediction/stability_limits.h"
 #include "smartmill_program/prediction/tool_models.h"
+#include "smartmill_program/prediction/wall_errors.h"
 
 namespace smartmill::program {
 
@@ -18,6 +19,7 @@ struct StepPrediction {
   ForcePrediction force;                                             ///< of the side of the tool
   double power = 0.0;                                                ///< [W] mean, of the cut
   double limit = std::numeric_limits<double>::quiet_NaN();           ///< [m] stability limit
+  double wall_error = std::numeric_limits<double>::quiet_NaN();      ///< [m] of a stable cut (WallErrors)
 };
 
 /// Predicts forces and stability of the steps of a program, each with the model of its tool.
@@ -33,9 +35,10 @@ class StepPredictor {
  private:
   struct OfTool {
     OfTool(const MachineModel& model, const CuttingCoefficients& cutting)
-        : force(*model.tool, cutting), limits(model) {}
+        : force(*model.tool, cutting), limits(model), walls(model) {}
     ForcePredictor force;
     StabilityLimits limits;
+    WallErrors walls;
   };
   OfTool& of(int tool);
 

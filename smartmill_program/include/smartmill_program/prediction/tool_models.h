@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_program/stock/tool_shape.h"
 
 namespace smartmill::program {
 
@@ -19,6 +20,7 @@ class ToolModels {
   /// @throws Error "T3: expected --model 3=FILE, ..." for a tool without model
   const MachineModel& of(int tool);
   double radius(int tool) { return of(tool).tool->radius(); }  ///< [m]
+  const ToolShape& shape(int tool);
   /// [m/s] Rapid feed of the machine by the first model that states its axes; 0: none does.
   double rapid() const;
   double acceleration() const;  ///< [m/s2] of the axes, in the same way
@@ -29,6 +31,7 @@ class ToolModels {
   const MachineAxes* axes() const;
 
   std::map<int, MachineModel> models_;
+  std::map<int, ToolShape> shapes_;
   std::optional<MachineModel> only_;  // belongs to the first tool that is requested
 };
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "smartmill_program/engagement/cut_simulation.h"
 #include "smartmill_program/prediction/step_predictor.h"
@@ -16,7 +17,7 @@ struct BlockSummary {
 
   BlockSummary() = default;
   explicit BlockSummary(const Move& move);
-  void add(const Step& step, const StepPrediction& prediction, double radius);
+  void add(const Step& step, const StepPrediction& prediction);
   void addDwell(double seconds) { time += seconds; }
 
   std::size_t block = 0;  ///< in the order of execution, from 0
@@ -33,10 +34,16 @@ struct BlockSummary {
   double peak_torque = NONE;               ///< [N m]
   double power = NONE;                     ///< [W] largest mean power of a step
   double margin = NONE;                    ///< [1] least stability limit over axial depth
+  double wall_error = NONE;                ///< [m] of the largest magnitude
   bool rapid_hit = false;                  ///< a rapid move removes material
+  bool holder_hit = false;                 ///< the holder meets material
 
   /// [1] Share of the feed motion's time without removal; NaN without feed motion.
   double airShare() const { return feed_time > 0.0 ? 1.0 - cut_time / feed_time : NONE; }
 };
+
+/// "NAME: line 12: G0: a rapid move hits the stock (and 3 more blocks)" of the first collision, of a rapid
+/// move or the holder; empty: there is none.
+std::string collisionText(const std::string& name, const std::vector<BlockSummary>& blocks);
 
 }  // namespace smartmill::program

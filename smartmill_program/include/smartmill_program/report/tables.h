@@ -15,7 +15,7 @@ CsvWriter blockTable(const std::vector<BlockSummary>& blocks);
 class StepTable {
  public:
   StepTable();
-  void add(const Step& step, const StepPrediction& prediction, double radius);
+  void add(const Step& step, const StepPrediction& prediction);
   const CsvWriter& csv() const { return csv_; }
 
  private:

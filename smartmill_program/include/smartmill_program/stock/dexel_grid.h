@@ -2,24 +2,21 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
+#include "smartmill_program/stock/stock_shape.h"
 #include "smartmill_program/stock/sweep.h"
 
 namespace smartmill::program {
 
-/// A block of material with edges along the axes.
-struct StockBlock {
-  std::array<double, 3> low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m]
-};
-
 /// Columns of material (z-dexels, z-buffer; van Hook 1986) on a square grid in x and y. Each has the height
 /// of the material at its middle, so that a stock without undercuts is described in full up to the width of a
-/// column.
+/// column. Where there is no material it is that of the bottom.
 class DexelGrid {
  public:
-  /// @param resolution [m] largest width of a column. @throws Error on an empty block and on too many columns
-  DexelGrid(const StockBlock& block, double resolution);
+  /// @param resolution [m] largest width of a column. @throws Error on an empty stock and on too many columns
+  DexelGrid(const StockShape& shape, double resolution);
 
   const StockBlock& block() const { return block_; }
   std::size_t columns(std::size_t axis) const { return count_[axis]; }  ///< along x (0) or y (1)
@@ -33,6 +30,10 @@ class DexelGrid {
   /// [m] Least and largest height of the columns around a point of the block: the four whose middles surround
   /// it and `border` more on each side.
   std::array<double, 2> heightsAround(double x, double y, std::size_t border = 0) const;
+  /// [m] Interpolated height at a point, where the curvature of the surface hardly changes between the
+  /// columns of heightsAround(); nullopt at walls, steps, edges and the border of the block. @param border >=
+  /// 1
+  std::optional<double> smoothHeight(double x, double y, std::size_t border) const;
   /// [m] Largest height in a range of columns: {first, last} along x, along y, inclusive.
   double highest(const std::array<std::size_t, 2>& x, const std::array<std::size_t, 2>& y) const;
 

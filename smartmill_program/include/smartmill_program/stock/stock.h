@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "smartmill_program/stock/dexel_grid.h"
@@ -10,14 +11,15 @@
 namespace smartmill::program {
 
 /// Material with the memory of what has cut it: columns for the height in the interior of surfaces, and the
-/// sweeps themselves for walls and slopes, where neighbouring columns differ. A wall is therefore exact and
-/// not rounded to a column; only what is narrower than a column is lost.
+/// sweeps themselves and the shape of the stock for walls, where neighbouring columns differ. A wall is
+/// therefore exact and not rounded to a column; only what is narrower than a column is lost. On smooth
+/// surfaces the height is interpolated.
 class Stock {
  public:
   static constexpr double EMPTY = -std::numeric_limits<double>::infinity();
 
   /// @param resolution [m] width of a column. @throws Error as DexelGrid
-  Stock(const StockBlock& block, double resolution);
+  Stock(const StockShape& shape, double resolution);
 
   const DexelGrid& columns() const { return grid_; }
   const StockBlock& block() const { return grid_.block(); }
@@ -29,8 +31,10 @@ class Stock {
   const Sweep& sweep() const { return sweeps_.back(); }
   double done() const { return done_; }  ///< [m] along the present sweep
 
-  /// [m] Height of the material at a point; EMPTY outside of the block and where the tool has cut through it.
+  /// [m] Height of the material at a point; EMPTY outside of the stock and where the tool has cut through it.
   double height(double x, double y) const;
+  /// Whether a column within a radius [m] of a point is higher than `z` [m].
+  bool reaches(double x, double y, double radius, double z) const;
   /// [m3] Material that the end face removes when the tip descends between two heights [m] at a place, from
   /// the columns.
   double faceVolume(double x, double y, double radius, double top, double bottom) const;
@@ -47,6 +51,7 @@ class Stock {
   void addTo(std::size_t tile_i, std::size_t tile_j);
   void prune(Tile& tile, std::size_t tile_i, std::size_t tile_j);
 
+  StockShape shape_;
   DexelGrid grid_;
   std::vector<Sweep> sweeps_;
   double done_ = 0.0;

@@ -4,12 +4,14 @@
 #include <deque>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/signal/unwrapped_angle.h"
+#include "smartmill_program/tool/sharp_tools.h"
 #include "smartmill_program/tool/tooth_watch.h"
 #include "smartmill_program/tool/wear_estimate.h"
 
@@ -55,15 +57,12 @@ class ToolMonitor {
  public:
   using Output = std::function<void(const ToolReport&)>;
 
-  /// @param tool until a condition states one @param hold_back [s] see StreamSorter @throws Error on a
+  /// @param tools with their models @param hold_back [s] see StreamSorter @throws Error on a
   /// parameter out of range.
-  ToolMonitor(const ToolMonitorParameters& parameters, const ToolGeometry& tool, double hold_back,
-              Output output);
+  ToolMonitor(const ToolMonitorParameters& parameters, SharpTools tools, double hold_back, Output output);
 
-  /// Coefficients of the sharp tool, see WearEstimate.
-  void setCoefficients(const CuttingCoefficients& value, const CuttingCoefficients& std_dev) {
-    wear_.setCoefficients(value, std_dev);
-  }
+  /// Coefficients of the sharp tools, to which cuts that begin are compared.
+  SharpTools& tools() { return tools_; }
   void push(const CuttingCondition& condition);
   void push(const CncState& state);
   void push(const SpindleAngle& angle);
@@ -78,7 +77,9 @@ class ToolMonitor {
 
   /// The name of the stream that delays the others; empty: none.
   std::string waitingFor() const { return sorter_.waitingFor(); }
-  const std::optional<ToothLoss>& loss() const { return loss_; }
+  const std::optional<ToothLoss>& loss() const { return loss_; }  ///< of the present tool
+  const ToolGeometry& tool() const { return tool_; }              ///< the present one
+  const CuttingCondition& condition() const { return condition_; }
 
  private:
   struct Sample {
@@ -88,12 +89,14 @@ class ToolMonitor {
   void handle(const CncState& state);
   void handle(const SpindleAngle& angle);
   void handle(const ForceBlock& block);
+  void changeTool(const std::string& name);
   void restart();
   void gap();
   void take(const ForceSample& sample);
   void report(double stamp, bool new_loss, const std::optional<CutWear>& wear);
 
   ToolMonitorParameters parameters_;
+  SharpTools tools_;
   ToothWatch watch_;
   WearEstimate wear_;
   Output output_;
@@ -102,8 +105,9 @@ class ToolMonitor {
 
   ToolGeometry tool_;
   CuttingCondition condition_;
-  std::optional<ToothLoss> loss_;
-  std::deque<Sample> samples_;  // later than the last angle
+  std::optional<ToothLoss> loss_;            // of the present tool
+  std::map<std::string, ToothLoss> losses_;  // of the others, by name
+  std::deque<Sample> samples_;               // later than the last angle
   std::optional<UnwrappedAngle> angle_;
   double speed_ = 0.0;  // [rad/s] of the last reading
   std::uint64_t next_index_ = 0;

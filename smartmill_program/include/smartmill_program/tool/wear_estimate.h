@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <deque>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_program/tool/sharp_tools.h"
 
 namespace smartmill::program {
 
@@ -69,11 +71,10 @@ class WearEstimate {
   /// @throws Error on a parameter out of range.
   explicit WearEstimate(const WearParameters& parameters);
 
-  /// Coefficients of the sharp tool; krc, kre NaN: not known, the tangential forces are compared.
-  /// @param std_dev NaN: coefficient_error
-  void setCoefficients(const CuttingCoefficients& value, const CuttingCoefficients& std_dev);
   /// A cut begins; without coefficients or for other kinds there is no estimate.
-  void begin(const CuttingCondition& condition);
+  /// @param sharp coefficients of the sharp tool; krc, kre NaN: not known, the tangential forces are
+  /// compared; std_dev NaN: coefficient_error
+  void begin(const CuttingCondition& condition, const std::optional<SharpCoefficients>& sharp);
   /// Mean force [N] over a revolution of the steady cut, x + i y of the machine.
   void add(double time, std::complex<double> force);
   /// The present cut up to now; empty: no expectation or less than three revolutions.
@@ -93,8 +94,6 @@ class WearEstimate {
   std::pair<double, double> edgeWear(const std::deque<Cut>& cuts) const;
 
   WearParameters parameters_;
-  std::optional<CuttingCoefficients> value_;
-  CuttingCoefficients std_dev_;
   std::optional<CuttingCondition> condition_;
   std::complex<double> direction_ = {1.0, 0.0};  // on which forces are projected, machine
   double chip_ = 0.0, edge_ = 0.0;               // [N] expected parts along direction_
@@ -108,7 +107,7 @@ class WearEstimate {
   std::complex<double> force_sum_;    // [N] of the revolutions, machine
   double last_ = 0.0;                 // [s]
   std::string tool_;
-  std::deque<Cut> cuts_;
+  std::map<std::string, std::deque<Cut>> cuts_;  // by tool
 };
 
 }  // namespace smartmill::program

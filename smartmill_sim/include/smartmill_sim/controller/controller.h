@@ -18,7 +18,7 @@ namespace smartmill::sim {
 ///
 /// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F.
 /// `#n=` is executed after all blocks before it. The program does not wait for M3 and M4; it waits for M5,
-/// M19, M119, M30 and M2; M0 waits for cycle start. A block that is not understood, leaves the travel or
+/// M6, M19, M119, M30 and M2; M0 waits for cycle start. A block that is not understood, leaves the travel or
 /// lacks F raises an alarm, which stops the machine and ends the session; so does a collision of the tool
 /// with an obstacle.
 ///

@@ -34,6 +34,8 @@ struct ControllerOptions {
   double motor_time_constant = 1500.0;           ///< [s] of the motors' heating: typical of servo motors
   std::size_t memory_size = 512 * 1024;          ///< [byte] of programs: 1280 m of tape, an option of a 30i
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
+  std::vector<int> magazine;                     ///< numbers of the tools to which M6 changes
+  double tool_change_time = 2.0;                 ///< [s] of M6 with the spindle at rest
   focas::SysInfo info = fineInfo();              ///< reported identification
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
   std::size_t buffer_size = 1024;                ///< [byte] of DNC text that has not run

@@ -11,6 +11,7 @@ struct MotionState {
   double spindle_angle = 0.0;                 ///< [rad] angle of tooth 1, 0..2 pi
   double spindle_speed = 0.0;                 ///< [rad/s] negative: counterclockwise (M4)
   int sequence = 0;                           ///< N word of the running or last block
+  int tool = 0;                               ///< T of the tool in the spindle; 0: that of the model
 };
 
 }  // namespace smartmill::sim

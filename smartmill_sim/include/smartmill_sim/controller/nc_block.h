@@ -27,7 +27,9 @@ struct NcBlock {
   std::optional<double> feed;                   ///< F
   std::optional<double> speed;                  ///< [rpm] S
   std::optional<int> m_code;
-  std::optional<int> macro;  ///< n of #n=value
+  std::optional<int> tool;     ///< T
+  bool length_offset = false;  ///< G43 H
+  std::optional<int> macro;    ///< n of #n=value
   std::optional<double> macro_value;
 
   bool moves() const { return axis[0] || axis[1] || axis[2]; }
@@ -37,7 +39,8 @@ struct NcBlock {
 using NcVariables = nc::Variables;
 
 /// Parses one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28
-/// G53 G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number,
+/// G40 G43 (H) G49 G53 G54..G59 G80 G90 G91 G94 G95; X Y Z F S T; M0..M9 M19 M30 M119; or #n=value. The
+/// lengths of all tools are 0: positions are those of the tip. A value is a number,
 /// which needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word
 /// with a vacant #n is ignored. Blanks, comments in parentheses and lines that begin with % are ignored.
 /// @throws NcAlarm (PS) for everything else; the alarm names IF, WHILE and GOTO.

@@ -35,8 +35,8 @@ class Cutter {
 
   /// Sets the contact from now on, see MillingProcess and RigidCut.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
-  /// Depth of each arc [m] > 0.
-  void setDepths(const std::vector<double>& depths);
+  /// The same arcs with other depths.
+  void setDepths(const std::vector<ContactArc>& arcs);
   void setLaw(const CuttingLaw& law);
   /// Other radii of the teeth from now on, see MillingProcess. @throws Error with tables.
   void setRadii(const std::vector<double>& radius_offset);
@@ -57,7 +57,6 @@ class Cutter {
  private:
   struct StraightMill {
     EdgeSlice slice;
-    double top = 0.0;  // [m] upper end of the engaged height
     EdgeSlice actual;  // means over the engaged height
     std::optional<MillingProcess> process;
     std::optional<RigidCut> rigid;

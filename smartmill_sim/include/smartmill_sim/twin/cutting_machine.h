@@ -52,6 +52,7 @@ class CuttingMachine {
 
   /// Starts a record: drift and hum restart. A new edge has edge_time 0.
   void setClock(const Clock& clock) { parts_.timeline.setClock(clock); }
+  const Clock& clock() const { return parts_.timeline.clock(); }
 
   /// The signal stage at the present instant.
   SignalStage signalStage() { return parts_.timeline.signalStage(); }

@@ -25,7 +25,8 @@ class EdgeLayers {
 
   bool empty() const { return layers_.empty(); }
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
-  void setDepths(const std::vector<double>& depths);
+  /// The same arcs with other depths.
+  void setDepths(const std::vector<ContactArc>& arcs);
   void setLaw(const CuttingLaw& law);
   /// Other radii of the teeth of the whole edge from now on. @throws Error for layers of tables.
   void setRadii(const std::vector<double>& radius_offset);

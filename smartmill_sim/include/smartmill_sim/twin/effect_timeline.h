@@ -29,6 +29,7 @@ class EffectTimeline {
 
   /// Starts a record: drift and hum restart.
   void setClock(const Clock& clock);
+  const Clock& clock() const { return clock_; }
   /// Begins a step. @param speed [rad/s] @return whether update() is required: from time to time, since
   /// effects change slowly, and at another speed
   bool beginStep(double speed);

@@ -48,6 +48,8 @@ class MillingProcess {
   /// The teeth have other radii from now on; surfaces that they have left remain until they are cut away.
   /// @param radius_offset [m] of each tooth, empty: none @throws Error on another number.
   void setRadii(std::vector<double> radius_offset);
+  /// The edge is inclined: an axial feed advances it across the tool by this share [1] (EdgeSlice::lean()).
+  void setLean(double lean) { lean_ = lean; }
   /// From here on returns the force of this tooth alone; all teeth cut.
   void selectTooth(int tooth) { only_tooth_ = tooth; }
 
@@ -88,6 +90,7 @@ class MillingProcess {
   double lengthening(int tooth, int n) const;
   double overhang(int tooth) const;
   void forgetRadii();
+  double axialChip(int tooth, int n) const;
   void addPass(int tooth);
   void shapePass(int tooth, int n, Pass& pass);
   double pathMargin(double vibrated, double fed) const;
@@ -105,6 +108,7 @@ class MillingProcess {
   CuttingLaw law_;
   double time_step_, lag_;
   double path_share_;  // [1] weight of the path correction
+  double lean_ = 0.0;  // [1]
   int only_tooth_ = -1;
   std::vector<ContactArc> arcs_;
   ToolHistory history_;

@@ -13,6 +13,7 @@ struct ToolMotion {
   double speed = 0.0;                          ///< [rad/s] of the spindle, >= 0
   std::array<double, 2> centre{{0, 0}};        ///< [m] x, y of the undeflected tool
   std::array<double, 2> velocity{{0, 0}};      ///< [m/s] of the undeflected tool
+  double sink = 0.0;                           ///< [m/s] along the axis, into the work
   std::array<double, 2> displacement{{0, 0}};  ///< [m] deflection of the tip
   std::array<double, 2> rate{{0, 0}};          ///< [m/s] of the displacement
 };

@@ -31,6 +31,7 @@ class AxesTrack {
     double time = 0.0;
     std::array<double, 3> position{};
     double revolutions = 0.0;
+    int tool = 0;
     bool jump = false;  // no motion from the previous point to here
     bool held = false;  // added by holdUntil()
   };

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -45,6 +46,9 @@ struct WorldOptions {
   std::size_t contact_update = 64;  ///< [samples] between two updates of the contact with the stock: 2.5 ms,
                                     ///< in which a tool moves 0.1 mm at 2.4 m/min
   double hammer_delay = 0.03;       ///< [s] of a solenoid from its command to the contact
+  /// Tools to which M6 changes, by T: of each model the tool, its coefficients and modes of the tip if
+  /// stated; everything else is that of the machine. The machine starts with the tool of its own model.
+  std::map<int, MachineModel> magazine;
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "seed of noise and scatter");
@@ -139,9 +143,9 @@ class World {
   /// Point of hits on the workpiece. @param point [m] from the plate's origin
   void setTapPoint(const std::array<double, 3>& point);
 
-  /// Breaks a tooth of the tool from the next block on. Thread-safe. @param tooth 1..teeth, 0: a new tool,
-  /// all teeth whole @param length [m] that its radius loses, from that of the whole tooth; 0: more than any
-  /// chip
+  /// Breaks a tooth of the tool in the spindle from the next block on. Thread-safe. @param tooth 1..teeth, 0:
+  /// a new tool, all teeth whole @param length [m] that its radius loses, from that of the whole tooth; 0:
+  /// more than any chip
   /// @return [s] time of the first sample with this tool @throws Error on another tooth or length.
   double breakTooth(int tooth, double length);
 
@@ -155,6 +159,15 @@ class World {
   void skipSamples(std::uint64_t samples);
 
  private:
+  /// A tool in the spindle or in the magazine, with the machine as it cuts with it.
+  struct MountedTool {
+    MountedTool(const MachineModel& model, double step) : machine(model, step) {}
+    const ToolGeometry& geometry() const { return *machine.model().tool; }
+    CuttingMachine machine;
+    std::vector<double> shortening;  // [m] of each tooth
+  };
+  void addTool(int number, const MachineModel& model);
+  void changeTool(int number);
   Hit drawHit(double now);
   void simulateBlock(Block& block, const std::vector<MotionState>& states);
   void updateContact(const MotionState& state);
@@ -168,8 +181,8 @@ class World {
   ServoRecorder servo_;
   std::optional<HammerStation> station_;
   ToolTip tip_;
-  CuttingMachine machine_;
-  std::vector<double> shortening_;  // [m] of each tooth
+  std::map<int, MountedTool> tools_;  // by T; 0: that of the model
+  MountedTool* tool_;                 // in the spindle
   std::optional<StockContact> stock_;
   std::optional<SpindleSensor> flange_;
   ManualForces manual_;

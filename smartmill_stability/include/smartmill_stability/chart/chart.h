@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "smartmill_core/cutting/same_tool.h"
+#include "smartmill_core/signal/streams.h"
 #include "smartmill_stability/chart/measured_machine.h"
 #include "smartmill_stability/chart/what_if.h"
 #include "smartmill_stability/learning/probing_choice.h"
@@ -47,6 +49,8 @@ class ChartMaker {
     return machine_.uncertainSystem(cut_, engagement);
   }
   int teeth() const { return cut_.tool.teeth; }
+  /// Whether the tool of a condition is that of the model, to which modes and charts belong.
+  bool hasTool(const CuttingCondition& condition) const { return isSameTool(cut_.tool, condition.tool); }
   std::size_t modesInX() const { return machine_.modesInX(); }
   double highestSpeed() const { return cut_.parameters.speed_high; }  ///< [rad/s]
 

@@ -78,8 +78,9 @@ struct ChatterState {
 
 /// Distinguishes chatter from forced vibration in the compensated force: applies ChatterCriterion to windows
 /// of whole revolutions within a steady cut. With ChatterParameters::angle none it applies judgeRecording()
-/// to the signal of the steady cut; a verdict that is unsure is not valid. Inputs in stamp order; the results
-/// depend on the inputs only.
+/// to the signal of the steady cut; a verdict that is unsure is not valid. Where the feed of a cut turns, the
+/// force in its frame repeats with the angle of the teeth to the feed: both are taken from the controller's
+/// positions. Inputs in stamp order; the results depend on the inputs only.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -98,7 +99,12 @@ class ChatterDetector {
     double time;
     std::array<double, 3> force;
   };
+  struct Position {
+    double time, x, y;
+  };
   using Angle = UnwrappedAngle;
+  void notePosition(const CncState& state);
+  std::optional<double> turnRate(double from, double to) const;
   void dropWindow();
   void notSteady(double stamp);
   void evaluate();
@@ -116,6 +122,7 @@ class ChatterDetector {
   std::optional<CuttingCondition> condition_;
   std::deque<Sample> samples_;
   std::deque<Angle> angles_;
+  std::deque<Position> positions_;                     // [m] where the feed turns
   std::optional<double> steady_since_, steady_until_;  // [s]
   std::optional<double> window_start_;                 // [rad] accumulated angle
   double last_state_ = 0.0;

@@ -39,7 +39,9 @@ EdgeSlice cornerSlice(const ToolGeometry& tool, double from, double to) {
   slice.edge_axial = out / length;
   slice.chip_radial = square_of_sine / rise;
   slice.chip_axial = 0.5 * corner_radius * (std::pow(std::sin(to), 2) - std::pow(std::sin(from), 2)) / rise;
-  slice.inset = corner_radius * (centreInset(tool) - slice.chip_radial);
+  // Of the mean radius along the edge: the edge force, whose length per height is largest near the tip, has
+  // its exact torque.
+  slice.inset = corner_radius * (centreInset(tool) - rise / length);
   return slice;
 }
 
@@ -107,11 +109,15 @@ std::vector<EdgeSlice> edgeSlices(const ToolGeometry& tool, double height, int s
   return list;
 }
 
-EdgeSlice upTo(double height, const EdgeSlice& slice, const ToolGeometry& tool) {
+EdgeSlice between(double low, double high, const EdgeSlice& slice, const ToolGeometry& tool) {
+  if (low == slice.low && high == slice.high) return slice;
   const double corner_radius = tool.edge.corner_radius;
-  EdgeSlice lower = cornerSlice(tool, leanOf(slice.low, corner_radius), leanOf(height, corner_radius));
-  lower.turn = slice.turn;
-  return lower;
+  EdgeSlice part = slice.curved ? cornerSlice(tool, leanOf(low, corner_radius), leanOf(high, corner_radius))
+                                : upperSlice(tool, low, high);
+  part.low = low;
+  part.high = high;
+  part.turn = slice.turn + tool.lag() * (low - slice.low);
+  return part;
 }
 
 ToolGeometry toolOf(const EdgeSlice& slice, const ToolGeometry& tool) {

@@ -38,12 +38,22 @@ Shares meanOver(double middle, double d) {
           0.5 * full * std::sin(2.0 * middle)};
 }
 
-// There is no force without a positive chip: only 0..pi of the engagement counts.
-double firstCut(const Engagement& e) {
-  return std::max(e.entry, 0.0);
+// There is no force without a positive chip c sin(phi) + level: only 0..pi of the engagement counts, without
+// the sides of a rising edge. @param level [m]
+double sideAngle(const Engagement& e, double level) {
+  if (level >= 0.0) return 0.0;
+  return e.feed_per_tooth > 0.0 ? std::asin(std::min(1.0, -level / e.feed_per_tooth)) : 0.5 * PI;
 }
-double lastCut(const Engagement& e) {
-  return std::min(e.exit, PI);
+double firstCut(const Engagement& e, double level) {
+  return std::max(e.entry, sideAngle(e, level));
+}
+double lastCut(const Engagement& e, double level) {
+  return std::min(e.exit, PI - sideAngle(e, level));
+}
+
+void requireBottom(double bottom, const Engagement& engagement) {
+  if (!(bottom >= 0.0 && bottom < engagement.axial_depth))
+    refuse("lower end of the cut", bottom, "m", "0 <= value < axial depth");
 }
 
 }  // namespace
@@ -112,32 +122,44 @@ void validate(const Engagement& engagement) {
   if (!(engagement.feed_per_tooth >= 0.0) || !std::isfinite(engagement.feed_per_tooth)) {
     refuse("feed per tooth", engagement.feed_per_tooth, "m", ">= 0");
   }
+  for (const EngagementBand& band : engagement.bands) {
+    if (!(band.entry >= 0.0 && band.exit > band.entry && band.exit <= TWO_PI + 1e-12))
+      refuse("exit angle of a band", band.exit, "rad", "entry < exit <= 2 pi");
+    if (!(band.bottom >= 0.0 && band.top > band.bottom && band.top <= engagement.axial_depth))
+      refuse("upper end of a band", band.top, "m", "lower end < value <= axial depth");
+  }
 }
 
 namespace {
 
-/// Calls visit(slice, mill, engagement) for the slices of a tool within the axial depth.
+/// Of one band.
+Engagement engagementOf(const EngagementBand& band, const Engagement& all) {
+  return {band.entry, band.exit, band.top, all.feed_per_tooth, {}, all.axial_feed_per_tooth};
+}
+
+/// Calls visit(slice, mill, engagement) for the slices of a tool between a height and the axial depth.
 template <class Visit>
-void forEachSlice(const ToolGeometry& tool, const Engagement& engagement, Visit&& visit) {
+void forEachSlice(const ToolGeometry& tool, const Engagement& engagement, double bottom, Visit&& visit) {
   if (tool.edge.serrated())
     throw Error(
         formatted("tool: serration: amplitude_mm: %g, expected a smooth edge (needed to compute the "
                   "force of a chip in proportion to the feed)",
                   tool.edge.serration_amplitude / units::MM));
   for (const EdgeSlice& whole : edgeSlices(tool, engagement.axial_depth)) {
-    const double top = std::min(whole.high, engagement.axial_depth);
-    if (top <= whole.low) break;
-    const EdgeSlice slice = whole.curved && top < whole.high ? upTo(top, whole, tool) : whole;
+    const double low = std::max(whole.low, bottom), high = std::min(whole.high, engagement.axial_depth);
+    if (high <= whole.low) break;
+    if (high <= low) continue;
+    const EdgeSlice slice = between(low, high, whole, tool);
     Engagement part = engagement;
-    part.axial_depth = top - slice.low;
-    visit(slice, toolOf(whole, tool), part);
+    part.axial_depth = high - low;
+    visit(slice, toolOf(slice, tool), part);
   }
 }
 
 }  // namespace
 
 MechanisticForce::MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients,
-                                   const Engagement& engagement)
+                                   const Engagement& engagement, double bottom)
     : tool_(tool), coefficients_(coefficients), engagement_(engagement) {
   validate(tool);
   validate(engagement);
@@ -148,12 +170,19 @@ MechanisticForce::MechanisticForce(const ToolGeometry& tool, const CuttingCoeffi
   for (const auto& [name, value] : values) {
     if (!std::isfinite(value)) refuse(name, value, "", "finite");
   }
-  if (tool.edge.straight()) return;
+  requireBottom(bottom, engagement);
+  bottom_ = bottom;
+  for (const EngagementBand& band : engagement.bands) {
+    slices_.emplace_back(tool, coefficients, engagementOf(band, engagement), band.bottom);
+    turn_.push_back(0.0);
+  }
+  if (!slices_.empty() || (tool.edge.straight() && bottom == 0.0)) return;
   CuttingLaw law;
   law.coefficients = coefficients;
-  forEachSlice(tool, engagement,
+  forEachSlice(tool, engagement, bottom,
                [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
                  slices_.emplace_back(mill, lawOf(slice, law).coefficients, part);
+                 slices_.back().level_ = slice.lean() * engagement.axial_feed_per_tooth;
                  turn_.push_back(slice.turn);
                });
 }
@@ -163,11 +192,14 @@ CuttingForce MechanisticForce::at(double spindle_angle) const {
   for (std::size_t s = 0; s < slices_.size(); ++s) sum.add(slices_[s].at(spindle_angle - turn_[s]));
   if (!slices_.empty()) return sum;
   const double lag = tool_.lag(), depth = engagement_.axial_depth;
-  const double entry = firstCut(engagement_), exit = lastCut(engagement_);
+  const double entry = firstCut(engagement_, level_), exit = lastCut(engagement_, level_);
   if (exit <= entry || engagement_.feed_per_tooth <= 0.0) return sum;
   const CuttingCoefficients& k = coefficients_;
   for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
-    const double chip = engagement_.feed_per_tooth * tool_.teeth * tool_.pitchOf(tooth) / TWO_PI;
+    const double share = tool_.teeth * tool_.pitchOf(tooth) / TWO_PI;
+    const double chip = engagement_.feed_per_tooth * share, level = level_ * share;
+    // The level cuts at every angle, as the edge does.
+    const double kt = k.kte + k.ktc * level, kr = k.kre + k.krc * level, ka = k.kae + k.kac * level;
     double tip = std::fmod(spindle_angle + tool_.toothAngle(tooth), TWO_PI);
     if (tip < 0.0) tip += TWO_PI;
     // The edge spans the immersion angles tip - lag depth .. tip, possibly several revolutions.
@@ -184,17 +216,17 @@ CuttingForce MechanisticForce::at(double spindle_angle) const {
       const double length = high - low;
       const Shares m = meanOver(tip - 0.5 * lag * (low + high), lag * length);
       const double c = chip * length;
-      sum.fx += -(k.ktc * c * m.sc + k.kte * length * m.c) - (k.krc * c * m.ss + k.kre * length * m.s);
-      sum.fy += (k.ktc * c * m.ss + k.kte * length * m.s) - (k.krc * c * m.sc + k.kre * length * m.c);
-      sum.fz += k.kac * c * m.s + k.kae * length;
-      sum.torque += tool_.radius() * (k.ktc * c * m.s + k.kte * length);
+      sum.fx += -(k.ktc * c * m.sc + kt * length * m.c) - (k.krc * c * m.ss + kr * length * m.s);
+      sum.fy += (k.ktc * c * m.ss + kt * length * m.s) - (k.krc * c * m.sc + kr * length * m.c);
+      sum.fz += k.kac * c * m.s + ka * length;
+      sum.torque += tool_.radius() * (k.ktc * c * m.s + kt * length);
     }
   }
   return sum;
 }
 
 CuttingForce MechanisticForce::mean() const {
-  const auto matrix = meanForceMatrix(tool_, engagement_);
+  const auto matrix = meanForceMatrix(tool_, engagement_, bottom_);
   const CuttingCoefficients& k = coefficients_;
   const std::array<double, 6> values{k.ktc, k.krc, k.kac, k.kte, k.kre, k.kae};
   std::array<double, 4> mean{};
@@ -206,16 +238,38 @@ CuttingForce MechanisticForce::mean() const {
 
 namespace {
 
+using ForceMatrix = std::array<std::array<double, 6>, 4>;
+
+/// Of a straight mill. @param level [m], see MechanisticForce
+ForceMatrix straightForceMatrix(const ToolGeometry& tool, const Engagement& engagement, double level) {
+  const double entry = firstCut(engagement, level), exit = lastCut(engagement, level);
+  if (exit <= entry || engagement.feed_per_tooth <= 0.0) return {};
+  const double arc = exit - entry;
+  const Shares m = meanOver(0.5 * (entry + exit), arc);
+  // Every element of the edge is in the cut for arc / (2 pi) of the time; the chips of all teeth sum to the
+  // feed per revolution.
+  const double edge = tool.teeth * engagement.axial_depth * arc / TWO_PI;
+  const double chip = edge * engagement.feed_per_tooth;
+  const double r = tool.radius();
+  ForceMatrix matrix{{{-chip * m.sc, -chip * m.ss, 0.0, -edge * m.c, -edge * m.s, 0.0},
+                      {chip * m.ss, -chip * m.sc, 0.0, edge * m.s, -edge * m.c, 0.0},
+                      {0.0, 0.0, chip * m.s, 0.0, 0.0, edge},
+                      {r * chip * m.s, 0.0, 0.0, r * edge, 0.0, 0.0}}};
+  for (std::array<double, 6>& row : matrix)
+    for (std::size_t k = 0; k < 3; ++k) row[k] += level * row[k + 3];
+  return matrix;
+}
+
 /// Sum over the slices: the coefficients of each are linear in those of the tool.
-std::array<std::array<double, 6>, 4> slicedForceMatrix(const ToolGeometry& tool,
-                                                       const Engagement& engagement) {
+ForceMatrix slicedForceMatrix(const ToolGeometry& tool, const Engagement& engagement, double bottom) {
   constexpr std::array<double CuttingCoefficients::*, 6> ALL{
       &CuttingCoefficients::ktc, &CuttingCoefficients::krc, &CuttingCoefficients::kac,
       &CuttingCoefficients::kte, &CuttingCoefficients::kre, &CuttingCoefficients::kae};
-  std::array<std::array<double, 6>, 4> sum{};
-  forEachSlice(tool, engagement,
+  ForceMatrix sum{};
+  forEachSlice(tool, engagement, bottom,
                [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
-                 const auto local = meanForceMatrix(mill, part);
+                 const ForceMatrix local =
+                     straightForceMatrix(mill, part, slice.lean() * engagement.axial_feed_per_tooth);
                  for (std::size_t c = 0; c < 6; ++c) {
                    CuttingLaw unit;
                    unit.coefficients.*ALL[c] = 1.0;
@@ -244,24 +298,23 @@ std::array<std::array<double, 6>, 4> turningForceMatrix(const ToolGeometry& tool
 
 }  // namespace
 
-std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, const Engagement& engagement) {
+std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, const Engagement& engagement,
+                                                     double bottom) {
   if (tool.teeth == 0) return turningForceMatrix(tool, engagement);
   validate(tool);
   validate(engagement);
-  if (!tool.edge.straight()) return slicedForceMatrix(tool, engagement);
-  const double entry = firstCut(engagement), exit = lastCut(engagement);
-  if (exit <= entry || engagement.feed_per_tooth <= 0.0) return {};
-  const double arc = exit - entry;
-  const Shares m = meanOver(0.5 * (entry + exit), arc);
-  // Every element of the edge is in the cut for arc / (2 pi) of the time; the chips of all teeth sum to the
-  // feed per revolution.
-  const double edge = tool.teeth * engagement.axial_depth * arc / TWO_PI;
-  const double chip = edge * engagement.feed_per_tooth;
-  const double r = tool.radius();
-  return {{{-chip * m.sc, -chip * m.ss, 0.0, -edge * m.c, -edge * m.s, 0.0},
-           {chip * m.ss, -chip * m.sc, 0.0, edge * m.s, -edge * m.c, 0.0},
-           {0.0, 0.0, chip * m.s, 0.0, 0.0, edge},
-           {r * chip * m.s, 0.0, 0.0, r * edge, 0.0, 0.0}}};
+  requireBottom(bottom, engagement);
+  if (!engagement.bands.empty()) {
+    std::array<std::array<double, 6>, 4> sum{};
+    for (const EngagementBand& band : engagement.bands) {
+      const auto local = meanForceMatrix(tool, engagementOf(band, engagement), band.bottom);
+      for (std::size_t r = 0; r < 4; ++r)
+        for (std::size_t c = 0; c < 6; ++c) sum[r][c] += local[r][c];
+    }
+    return sum;
+  }
+  if (!tool.edge.straight() || bottom > 0.0) return slicedForceMatrix(tool, engagement, bottom);
+  return straightForceMatrix(tool, engagement, 0.0);
 }
 
 }  // namespace smartmill

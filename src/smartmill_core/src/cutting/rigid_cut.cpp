@@ -190,7 +190,7 @@ std::array<CuttingForce, 2> RigidCut::meanTerms() const {
   EdgeSums sums;
   for (const ContactArc& arc : arcs_) {
     // A single entry of shapes is for all teeth.
-    const double share = arc.depth / TWO_PI * (rule_.alike() ? rule_.teeth() : 1);
+    const double share = (arc.depth - arc.bottom) / TWO_PI * (rule_.alike() ? rule_.teeth() : 1);
     for (const std::vector<ChipShape>& shapes : shapes_) integrate(shapes, arc.entry, arc.exit, share, sums);
   }
   return terms(sums);

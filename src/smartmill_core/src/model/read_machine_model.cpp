@@ -103,6 +103,12 @@ void readTool(const StrictYaml& map, MachineModel& model) {
   }
   if (const auto stickout = map.optionalNumber("stickout_mm", POSITIVE))
     model.stickout = *stickout * units::MM;
+  if (const auto height = map.optionalNumber("edge_height_mm", POSITIVE))
+    model.edge_height = *height * units::MM;
+  if (const auto diameter = map.optionalNumber("holder_diameter_mm", POSITIVE)) {
+    if (!model.stickout) map.fail("holder_diameter_mm", "needs stickout_mm, where the holder begins");
+    model.holder_diameter = *diameter * units::MM;
+  }
   map.finish();
   model.tool = tool;
 }

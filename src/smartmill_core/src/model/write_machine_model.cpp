@@ -114,6 +114,8 @@ void writeTool(std::ostream& out, const MachineModel& model) {
   }
   if (!tool.pitch.empty()) out << "  pitch_deg: " << list(tool.pitch, units::radFromDeg(1.0)) << "\n";
   writeOptional(out, "stickout_mm", model.stickout, units::MM);
+  writeOptional(out, "edge_height_mm", model.edge_height, units::MM);
+  writeOptional(out, "holder_diameter_mm", model.holder_diameter, units::MM);
 }
 
 void writeToolTip(std::ostream& out, const MachineModel& model) {

@@ -27,9 +27,14 @@ void HitCollector::disarm() {
 
 void HitCollector::reset() {
   disarm();
+  clearPreTrigger();
+  rate_ = 0.0;
+}
+
+void HitCollector::clearPreTrigger() {
   force_before_.clear();
   volt_before_.clear();
-  rate_ = 0.0;
+  sum_before_ = 0.0;
 }
 
 std::optional<HitCollector::Record> HitCollector::add(double time, std::uint64_t index, double rate,
@@ -40,9 +45,7 @@ std::optional<HitCollector::Record> HitCollector::add(double time, std::uint64_t
                    ? "the sample rate changed within the record"
                    : "samples " + std::to_string(next_index_) + ".." + std::to_string(index) + " are missing";
     }
-    // No pre-trigger across a gap.
-    force_before_.clear();
-    volt_before_.clear();
+    clearPreTrigger();  // none across a gap
     rate_ = rate;
   }
   next_index_ = index + 1;
@@ -56,13 +59,15 @@ std::optional<HitCollector::Record> HitCollector::add(double time, std::uint64_t
     }
     if (hit_.force.size() < total) return std::nullopt;
     recording_ = armed_ = false;
-    force_before_.clear();
-    volt_before_.clear();
+    clearPreTrigger();
     return Record{std::move(hit_), std::move(fault_)};
   }
-  if (armed_ && force_before_.size() >= pre) {
+  // The running sum, of which only rounding errors are wrong, decides whether to compute the mean.
+  if (armed_ && force_before_.size() >= pre &&
+      !(force - sum_before_ / static_cast<double>(pre) < 0.5 * options_.trigger_force)) {
     double base = 0.0;
     for (const double f : force_before_) base += f / static_cast<double>(pre);
+    sum_before_ = base * static_cast<double>(pre);
     if (std::isfinite(base) && force - base > options_.trigger_force) {
       recording_ = true;
       fault_.clear();
@@ -80,7 +85,9 @@ std::optional<HitCollector::Record> HitCollector::add(double time, std::uint64_t
   }
   force_before_.push_back(force);
   volt_before_.push_back(volt);
+  sum_before_ += force;
   while (force_before_.size() > pre) {
+    sum_before_ -= force_before_.front();
     force_before_.pop_front();
     volt_before_.pop_front();
   }

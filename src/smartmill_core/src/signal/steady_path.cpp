@@ -23,6 +23,14 @@ bool onSteadyPath(const CuttingCondition& condition, const CncState& state, doub
   return distance2 - along * along / length2 <= tolerance * tolerance;
 }
 
+bool feedTurns(const CuttingCondition& condition) {
+  return condition.kind == CuttingCondition::Kind::cut && std::isnan(condition.steady_to[0]);
+}
+
+bool inSteadyCut(const CuttingCondition& condition, const CncState& state, double tolerance) {
+  return feedTurns(condition) ? state.feed > 0.0 : onSteadyPath(condition, state, tolerance);
+}
+
 double headingOf(const CuttingCondition& condition) {
   const auto& from = condition.steady_from;
   const auto& to = condition.steady_to;

@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/cutting/contact_arc.h"
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -20,14 +22,14 @@ TEST(ContactArc, turnsWithTheFeed) {
   const auto arcs = [](double entry, double exit, double direction) {
     return contactArcs({entry, exit, 1e-3, 1e-4}, direction);
   };
-  const auto expect = [](const std::vector<ContactArc>& arcs,
+  const auto expect = [](const std::vector<ContactArc>& found,
                          const std::vector<std::array<double, 2>>& ends) {
-    ASSERT_EQ(arcs.size(), ends.size());
+    ASSERT_EQ(found.size(), ends.size());
     for (std::size_t k = 0; k < ends.size(); ++k) {
-      EXPECT_NEAR(arcs[k].entry, ends[k][0], 1e-12);
-      EXPECT_NEAR(arcs[k].exit, ends[k][1], 1e-12);
-      EXPECT_EQ(arcs[k].depth, 1e-3);
-      validate(arcs[k]);
+      EXPECT_NEAR(found[k].entry, ends[k][0], 1e-12);
+      EXPECT_NEAR(found[k].exit, ends[k][1], 1e-12);
+      EXPECT_EQ(found[k].depth, 1e-3);
+      validate(found[k]);
     }
   };
   expect(arcs(0.0, PI, 0.0), {{0.0, PI}});
@@ -38,6 +40,36 @@ TEST(ContactArc, turnsWithTheFeed) {
   const double entry = 1.2, exit = 3.1;
   EXPECT_EQ(arcs(entry, exit, 0.0)[0].entry, entry);
   EXPECT_EQ(arcs(entry, exit, 0.0)[0].exit, exit);
+}
+
+// Two bands over each other are the whole edge; the upper one lags.
+TEST(ContactArc, bandsOfAnEdgeSumToTheWhole) {
+  ToolGeometry tool;
+  tool.teeth = 3;
+  tool.diameter = 10e-3;
+  tool.helix = 0.6;
+  const CuttingCoefficients k{1e9, 4e8, 2e8, 2e4, 1.5e4, 1e3};
+  const Engagement whole{0.3, 2.1, 4e-3, 1e-4};
+  Engagement bands = whole;
+  bands.bands = {{0.3, 2.1, 0.0, 1.5e-3}, {0.3, 2.1, 1.5e-3, 4e-3}};
+  CuttingLaw law;
+  law.coefficients = k;
+  RigidCut one(tool, law, whole), two(tool, law, bands);
+  const MechanisticForce first(tool, k, whole), second(tool, k, bands);
+  for (double angle = 0.0; angle < 6.3; angle += 0.1) {
+    EXPECT_NEAR(two.at(angle).fx, one.at(angle).fx, 1e-6);
+    EXPECT_NEAR(two.at(angle).torque, one.at(angle).torque, 1e-8);
+    EXPECT_NEAR(second.at(angle).fy, first.at(angle).fy, 1e-9);
+  }
+  EXPECT_NEAR(second.mean().fx, first.mean().fx, 1e-9);
+  EXPECT_NEAR(two.meanTerms()[0].fy, one.meanTerms()[0].fy, 1e-9);
+  // A band alone, by the difference of two cuts.
+  Engagement upper = whole, low = whole;
+  upper.bands = {{0.3, 2.1, 1.5e-3, 4e-3}};
+  low.axial_depth = 1.5e-3;
+  RigidCut band(tool, law, upper), below(tool, law, low);
+  for (double angle = 0.0; angle < 6.3; angle += 0.1)
+    EXPECT_NEAR(band.at(angle).fy, one.at(angle).fy - below.at(angle).fy, 1e-3);
 }
 
 TEST(SineCosine, equalsTheStandardLibrary) {

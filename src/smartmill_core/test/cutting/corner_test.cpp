@@ -81,10 +81,10 @@ TEST(Corner, theNormalRotatesFromAxialToRadial) {
 TEST(Corner, aSliceIsTruncatedExactly) {
   const EdgeSlice slice = edgeSlices(withCorner(4e-3), 0.0)[3];
   const double middle = 0.5 * (slice.low + slice.high);
-  const EdgeSlice below = upTo(middle, slice, withCorner(4e-3));
+  const EdgeSlice below = between(slice.low, middle, slice, withCorner(4e-3));
   EXPECT_NEAR(below.low, slice.low, 1e-15);
   EXPECT_NEAR(below.high, middle, 1e-15);
-  const EdgeSlice whole = upTo(slice.high, slice, withCorner(4e-3));
+  const EdgeSlice whole = between(slice.low, slice.high, slice, withCorner(4e-3));
   EXPECT_NEAR(whole.length, slice.length, 1e-12);
   EXPECT_NEAR(whole.inset, slice.inset, 1e-15);
 }

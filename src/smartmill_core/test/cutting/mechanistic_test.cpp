@@ -274,6 +274,34 @@ TEST(MechanisticForce, edgesOfOtherShapesAreTheSumOfTheirElements) {
   }
 }
 
+// Two parts of the height have the force of both together.
+TEST(MechanisticForce, aCutAboveTheTipIsTheRestOfTheWholeCut) {
+  const CuttingCoefficients k{700e6, 300e6, 120e6, 25e3, 20e3, 8e3};
+  std::vector<ToolGeometry> tools(4, ToolGeometry{3, 12e-3, 0.6, {}});
+  tools[1].edge.corner_radius = 2e-3;
+  tools[2].edge.corner_radius = 6e-3;
+  tools[3].edge.edge_angle = 0.8;
+  for (const ToolGeometry& tool : tools) {
+    for (const double bottom : {0.3e-3, 1.1e-3, 2.7e-3}) {
+      const Engagement whole{0.4, 2.2, 3e-3, 0.08e-3}, below{0.4, 2.2, bottom, 0.08e-3};
+      for (double angle = 0.0; angle < 6.2; angle += 0.31) {
+        CuttingForce sum = MechanisticForce(tool, k, below).at(angle);
+        sum.add(MechanisticForce(tool, k, whole, bottom).at(angle));
+        const CuttingForce expected = MechanisticForce(tool, k, whole).at(angle);
+        // A slice of a cone has the radius of its middle.
+        const double tolerance = tool.edge.edge_angle < 1.5 ? 0.02 : 2e-3;
+        EXPECT_NEAR(sum.fx, expected.fx, 0.5 * tolerance * 500);
+        EXPECT_NEAR(sum.fy, expected.fy, 0.5 * tolerance * 500);
+        EXPECT_NEAR(sum.torque, expected.torque, tolerance * 3);
+      }
+      CuttingForce mean = MechanisticForce(tool, k, below).mean();
+      mean.add(MechanisticForce(tool, k, whole, bottom).mean());
+      EXPECT_NEAR(mean.fy, MechanisticForce(tool, k, whole).mean().fy, 1e-9 + 1e-9 * std::abs(mean.fy));
+    }
+  }
+  EXPECT_THROW(MechanisticForce(tools[0], k, {0.4, 2.2, 3e-3, 0.08e-3}, 3e-3), Error);
+}
+
 // Ball end, one edge engaged over its radius r: integrals over a quarter of a circle.
 TEST(MechanisticForce, meanForceOfABallEndHasAClosedForm) {
   const double r = 10e-3, c = 1e-4;
@@ -286,6 +314,57 @@ TEST(MechanisticForce, meanForceOfABallEndHasAClosedForm) {
   EXPECT_NEAR(m[0][2], teeth * 0.5 * PI * c * r / 2.0, 1e-12);        // fx of Kac: mean of cos(kappa)
   EXPECT_NEAR(m[2][1], teeth * 2.0 * c * r / 2.0, 1e-12);             // fz of Krc
   EXPECT_NEAR(m[1][3], teeth * 2.0 * r * PI / 2.0, 1e-9);             // fy of Kte: length of the edge
+  EXPECT_NEAR(m[3][3], teeth * PI * r * r, 1e-12);                    // torque of Kte: radius over the edge
+  const double chip = teeth * 2.0 * c * r * r * PI / 4.0;             // torque of Ktc: radius over the height
+  EXPECT_NEAR(m[3][0], chip, 2e-3 * chip);
+  // A finishing cut near the tip, between heights that are not those of slices.
+  const double depth = 0.07 * r, lean = std::acos(1.0 - depth / r);
+  Engagement bands{0.0, PI, depth, c};
+  for (int k = 0; k < 7; ++k) bands.bands.push_back({0.0, PI, k * depth / 7, (k + 1) * depth / 7});
+  const double edge = teeth * PI * r * r * (1.0 - std::cos(lean));
+  EXPECT_NEAR(meanForceMatrix(ball, bands)[3][3], edge, 1e-12);
+  EXPECT_NEAR(meanForceMatrix(ball, {0.0, PI, depth, c})[3][3], edge, 1e-12);
+}
+
+// The chip of a ball that also feeds along its axis: c sin(phi) sin(kappa) + a cos(kappa). In a slot over the
+// whole radius and down, T = N / (2 pi) Ktc (2 c pi r^2 / 4 + pi a r^2 / 2); up, the part without a chip does
+// not cut.
+TEST(MechanisticForce, anAxialFeedOfABallHasAClosedForm) {
+  const double r = 10e-3, c = 1e-4;
+  ToolGeometry ball = tool(2, 2.0 * r, 30.0);
+  ball.edge.corner_radius = r;
+  for (const double slope : {0.2, 0.02, -0.02, -0.2}) {
+    const double a = slope * c;
+    Engagement cut{0.0, PI, r, c};
+    cut.axial_feed_per_tooth = a;
+    double chip = 0.0;
+    constexpr int PARTS = 400;
+    for (int i = 0; i < PARTS; ++i) {
+      const double kappa = 0.5 * PI * (i + 0.5) / PARTS, sine = std::sin(kappa), cosine = std::cos(kappa);
+      for (int j = 0; j < PARTS; ++j) {
+        const double phi = PI * (j + 0.5) / PARTS;
+        chip += std::max(0.0, c * std::sin(phi) * sine + a * cosine) * r * sine * r * 0.5 * PI / PARTS * PI /
+                PARTS;
+      }
+    }
+    if (slope > 0.0) {
+      EXPECT_NEAR(chip, 2.0 * c * PI * r * r / 4.0 + PI * a * r * r / 2.0, 1e-4 * chip);
+    }
+    const double expected = 2.0 / TWO_PI * chip;
+    EXPECT_NEAR(meanForceMatrix(ball, cut)[3][0], expected, 3e-3 * expected) << slope;
+    // The mean of the force over the angle is that of the matrix.
+    const CuttingCoefficients k{1e9, 4e8, 2e8, 0.0, 0.0, 0.0};
+    const MechanisticForce force(ball, k, cut);
+    CuttingForce mean;
+    for (int i = 0; i < 720; ++i) mean.add(force.at(TWO_PI * (i + 0.5) / 720), 1.0 / 720);
+    EXPECT_NEAR(mean.torque, force.mean().torque, 1e-4 * force.mean().torque);
+    EXPECT_NEAR(mean.fy, force.mean().fy, 1e-4 * std::abs(force.mean().fy));
+  }
+  // A flat end mill has no inclined edge.
+  Engagement cut{0.3, 2.0, 2e-3, c};
+  const auto level = meanForceMatrix(tool(2, 2.0 * r, 30.0), cut);
+  cut.axial_feed_per_tooth = 0.5 * c;
+  EXPECT_EQ(meanForceMatrix(tool(2, 2.0 * r, 30.0), cut), level);
 }
 
 TEST(MechanisticForce, refusesASerratedEdge) {

@@ -293,7 +293,7 @@ FrequencyResponse driftingBeam(double drift, int hits) {
   std::normal_distribution<double> normal;
   FrequencyResponse frf;
   frf.averages = hits;
-  for (double f = 20.0; f < 1300.0; f += 0.1) {
+  for (double f = 300.0; f < 1200.0; f += 0.1) {
     std::complex<double> sum;
     double power = 0.0;
     for (int k = 0; k < hits; ++k) {

@@ -151,7 +151,8 @@ TEST(MachineModel, edgesOfATool) {
   const TemporaryFolder folder;
   const std::string text =
       "format: smartmill-model/1\ntool:\n  teeth: 2\n  diameter_mm: 20\n  helix_deg: [35, 38]\n"
-      "  corner_radius_mm: 2.5\n  edge_angle_deg: 45\n  serration: {amplitude_mm: 0.2, wavelength_mm: 2}\n";
+      "  corner_radius_mm: 2.5\n  edge_angle_deg: 45\n  serration: {amplitude_mm: 0.2, wavelength_mm: 2}\n"
+      "  stickout_mm: 51\n  edge_height_mm: 6\n  holder_diameter_mm: 40\n";
   writeMachineModel(readMachineModel(folder.write("a.yaml", text)), folder.file("b.yaml"));
   for (const char* file : {"a.yaml", "b.yaml"}) {
     const ToolGeometry tool = *readMachineModel(folder.file(file)).tool;
@@ -163,6 +164,9 @@ TEST(MachineModel, edgesOfATool) {
                 0.5 * (std::tan(units::radFromDeg(35.0)) + std::tan(units::radFromDeg(38.0))), 1e-12);
     EXPECT_DOUBLE_EQ(tool.edge.serration_amplitude, 0.2e-3);
     EXPECT_DOUBLE_EQ(tool.edge.serration_wavelength, 2e-3);
+    const MachineModel model = readMachineModel(folder.file(file));
+    EXPECT_DOUBLE_EQ(model.edge_height.value_or(0.0), 6e-3);
+    EXPECT_DOUBLE_EQ(model.holder_diameter.value_or(0.0), 40e-3);
   }
   const std::string flat =
       "format: smartmill-model/1\ntool: {teeth: 2, diameter_mm: 20, helix_deg: 30, edge_angle_deg: 90}\n";
@@ -181,6 +185,8 @@ TEST(MachineModel, errorsNameTheEdgesOfATool) {
         "tool.corner_radius_mm: 10.5 is out of range (0 <= value <= 10)"},
        {"corner_radius_mm: 2.5", "corner_radius_mm: -1",
         "tool.corner_radius_mm: -1 is out of range (0 <= value <= 10)"},
+       {"edge_angle_deg: 90", "holder_diameter_mm: 40",
+        "tool.holder_diameter_mm: needs stickout_mm, where the holder begins"},
        {"edge_angle_deg: 90", "edge_angle_deg: 0",
         "tool.edge_angle_deg: 0 is out of range (0 < value <= 90)"},
        {"edge_angle_deg: 90", "edge_angle_deg: 95",

@@ -37,8 +37,10 @@ TEST(Coverage, rejectsEmptyInputAndZeroDeviations) {
   EXPECT_FALSE(Coverage().isCalibrated());
   EXPECT_FALSE(estimates(Coverage::RUNS - 10, 1.0).isCalibrated());  // too few
   EXPECT_FALSE(estimates(2000, 1.0).isCalibrated(Coverage::RUNS - 10.0));
-  EXPECT_FALSE(estimates(60, 1.0).isCalibrated(0.0, 2.0));
-  EXPECT_TRUE(estimates(72, 1.0).isCalibrated(0.0, 2.0));
+  EXPECT_FALSE(estimates(60, 1.0).isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
+  EXPECT_TRUE(estimates(Coverage::FEW, 1.0).isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
+  EXPECT_FALSE(estimates(Coverage::FEW, 0.5).isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
+  EXPECT_FALSE(estimates(Coverage::FEW, 2.0).isCalibrated(0.0, Coverage::FACTOR_OF_FEW));
   Coverage coverage = estimates(Coverage::RUNS, 1.0);
   coverage.add(0.0, 0.0);
   EXPECT_FALSE(coverage.isCalibrated());

@@ -60,7 +60,8 @@ class Followers {
   /// a goal or a condition then precedes all later data. @throws Error as keepUp()
   void settle();
 
-  /// settle(), then the nodes report inputs that are behind the others. @throws Error as keepUp()
+  /// As settle(), with fewer queries, then the nodes report inputs that are behind the others. @throws Error
+  /// as keepUp()
   void step();
 
   /// Announces the end of the data: the nodes release delayed results, one node after the other.
@@ -84,6 +85,7 @@ class Followers {
   Response call(Node& node, std::uint8_t phase);
   bool tryCall(Node& node, std::uint8_t phase, Response& response);
   std::uint64_t updateCounts();
+  void settle(int rounds);
   void waitForDelivery();
   std::uint64_t behind() const;
   void waitFor(const std::function<std::string()>& missing, double timeout);

@@ -12,15 +12,16 @@ namespace smartmill {
 
 /// An interval of immersion angles at which the teeth meet material, over a height of the tool.
 struct ContactArc {
-  double entry = 0.0;  ///< [rad] 0..2 pi, clockwise from +y of the machine
-  double exit = 0.0;   ///< [rad] > entry, <= 2 pi
-  double depth = 0.0;  ///< [m] from the tip up
+  double entry = 0.0;   ///< [rad] 0..2 pi, clockwise from +y of the machine
+  double exit = 0.0;    ///< [rad] > entry, <= 2 pi
+  double depth = 0.0;   ///< [m] upper end above the tip
+  double bottom = 0.0;  ///< [m] lower end above the tip
 };
 
 /// @throws Error on an arc outside 0..2 pi or without height.
 void validate(const ContactArc& arc);
 
-/// The arcs of a cut in the machine: one, or two where it contains +y.
+/// The arcs of a cut in the machine: one of each band, or two where it contains +y.
 /// @param feed_direction [rad] of the feed in the machine, from +x towards +y
 std::vector<ContactArc> contactArcs(const Engagement& engagement, double feed_direction);
 
@@ -40,12 +41,13 @@ template <class Visit>
 void forEachEdgeSegment(const std::vector<ContactArc>& arcs, double lag,
                         const std::vector<double>& tooth_angle, double angle, Visit&& visit) {
   for (const ContactArc& arc : arcs) {
-    const double spread = lag * arc.depth;
+    const double rise = arc.depth - arc.bottom, spread = lag * rise;
     const bool straight = spread < LEAST_LAG;
-    const double height = straight ? arc.depth : 1.0 / lag;
+    const double height = straight ? rise : 1.0 / lag;
     for (std::size_t j = 0; j < tooth_angle.size(); ++j) {
-      // The edge covers low..tip; one revolution earlier it may reach into the arc again.
-      double tip = wrapped(angle + tooth_angle[j]);
+      // The edge covers low..tip, from its lower end on; one revolution earlier it may reach into the arc
+      // again.
+      double tip = wrapped(angle + tooth_angle[j] - lag * arc.bottom);
       for (double low = tip - spread;; tip += units::TWO_PI, low += units::TWO_PI) {
         const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);
         if (straight ? tip >= arc.entry && tip < arc.exit : to > from)

@@ -38,6 +38,8 @@ struct EdgeSlice {
   bool curved = false;  ///< part of the corner
   double turn = 0.0;    ///< [rad] by which tooth 1 of toolOf() at the slice's lower end lags behind the tip
 
+  /// [1] cot(kappa), mean over the height: across the tool an axial feed advances the edge by this share.
+  double lean() const { return length * edge_axial; }
   /// [m] Of a slice with an upper end.
   double middle() const { return 0.5 * (low + high); }
 };
@@ -54,8 +56,8 @@ double cornerHeight(const ToolGeometry& tool);
 /// invalid shape, and on edges that meet (ToolGeometry::pitchAt()).
 std::vector<EdgeSlice> edgeSlices(const ToolGeometry& tool, double height, int slices = CORNER_SLICES);
 
-/// The portion of a corner slice below a height [m] within it.
-EdgeSlice upTo(double height, const EdgeSlice& slice, const ToolGeometry& tool);
+/// The portion of a slice between two heights [m] within it.
+EdgeSlice between(double low, double high, const EdgeSlice& slice, const ToolGeometry& tool);
 
 /// The straight mill that cuts like a slice: same mean lag with height, local radius and pitch.
 ToolGeometry toolOf(const EdgeSlice& slice, const ToolGeometry& tool);

@@ -52,13 +52,26 @@ struct ToolGeometry {
 /// @throws Error naming the first key of the model file that shapes the edge otherwise. @param why "to ..."
 void requireStraightEdge(const ToolGeometry& tool, const std::string& why);
 
+/// Engagement of a range of the tool's height.
+struct EngagementBand {
+  double entry = 0.0;   ///< [rad]
+  double exit = 0.0;    ///< [rad] > entry
+  double bottom = 0.0;  ///< [m] above the tip
+  double top = 0.0;     ///< [m] > bottom
+};
+
 /// Radial and axial engagement and feed of a cut. Angles are immersion angles, clockwise from +y; x is the
 /// feed direction; up-milling starts at 0, down-milling ends at pi.
 struct Engagement {
-  double entry = 0.0;           ///< [rad]
-  double exit = 0.0;            ///< [rad] > entry
-  double axial_depth = 0.0;     ///< [m]
+  double entry = 0.0;           ///< [rad]; of several bands the least
+  double exit = 0.0;            ///< [rad] > entry; of several bands the largest
+  double axial_depth = 0.0;     ///< [m] from the tip to the highest contact
   double feed_per_tooth = 0.0;  ///< [m]
+  /// Where the engagement changes over the height (ball end, steps in the stock), from the tip up; empty:
+  /// entry to exit over the whole depth.
+  std::vector<EngagementBand> bands{};
+  /// [m] of the axial feed into the work (a ramp down); up: negative. Curved and inclined edges cut it too.
+  double axial_feed_per_tooth = 0.0;
 };
 
 /// Linear edge-force model, forces per tooth acting on the tool (Dunwoody eq. 2.1).

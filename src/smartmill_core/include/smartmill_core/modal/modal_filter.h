@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -22,6 +23,7 @@ class ModalFilter {
   /// and this one. Zero order: the output depends on the inputs of earlier samples (its direct share also on
   /// this one's).
   double step(double input) {
+    if (input == 0.0 && last_input_ == 0.0) endDecay();
     double output = direct_ * input;
     for (Section& s : sections_) {
       const double x = s.a11 * s.x + s.a12 * s.v + s.b1 * last_input_ + s.c1 * input;
@@ -64,6 +66,14 @@ class ModalFilter {
     double x, v;
     double stiffness, damping;  // x'' = stiffness (input - x) - damping x'
   };
+  /// A free vibration ends at 1e-200 of the unit of input: it would decay to denormal numbers, with which a
+  /// processor computes a hundred times more slowly.
+  void endDecay() {
+    for (Section& s : sections_) {
+      if (std::abs(s.x) + std::abs(s.v) < 1e-200) s.x = s.v = 0.0;
+    }
+  }
+
   std::vector<Section> sections_;
   double direct_, sample_rate_;
   double last_input_ = 0.0;

@@ -119,7 +119,9 @@ struct Uncertainty {
 struct MachineModel {
   std::string file;  ///< for messages
   std::optional<ToolGeometry> tool;
-  std::optional<double> stickout;                  ///< [m]
+  std::optional<double> stickout;         ///< [m] from the tip to the holder's face
+  std::optional<double> edge_height;      ///< [m] of the edges above the tip; empty: no less than any cut
+  std::optional<double> holder_diameter;  ///< [m] largest, above the stickout; empty: no holder
   std::optional<CuttingCoefficients> cutting;      ///< NaN: the file omits that key; needCutting() throws
   std::optional<CuttingCoefficients> cutting_std;  ///< NaN: that key has no _std key; empty: none has
   ToolTip tool_tip;

@@ -38,11 +38,14 @@ class HitCollector {
   void reset();
 
  private:
+  void clearPreTrigger();
+
   HitCollectorOptions options_;
   bool armed_ = false, recording_ = false;
   double rate_ = 0.0;
   std::uint64_t next_index_ = 0;
-  std::deque<double> force_before_, volt_before_;
+  std::deque<double> force_before_, volt_before_;  // pre-trigger
+  double sum_before_ = 0.0;                        // of these forces
   Hit hit_;
   std::string fault_;
 };

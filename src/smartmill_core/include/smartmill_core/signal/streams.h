@@ -86,7 +86,7 @@ struct CuttingCondition {
   std::string name;
   std::string material;
   std::string tool_name;
-  ToolGeometry tool;                      ///< even pitch, one helix angle
+  ToolGeometry tool;                      ///< smooth edges of one helix angle
   double cut_time_before = NOT_A_NUMBER;  ///< [s] time in the work of this tool before the stamp
   Engagement engagement;
   double spindle_speed = 0.0;                    ///< [rad/s] commanded

@@ -174,8 +174,11 @@ void read(const M& m, CuttingCondition& c) {
   c.tool.helix = m.helix;
   c.tool.edge.corner_radius = m.corner_radius;
   c.tool.edge.edge_angle = m.edge_angle == 0.0 ? 0.5 * units::PI : m.edge_angle;
+  c.tool.pitch = m.pitch;
   c.cut_time_before = m.cut_time_before;
   c.engagement = {m.entry_angle, m.exit_angle, m.axial_depth, m.feed_per_tooth};
+  for (const auto& band : m.bands)
+    c.engagement.bands.push_back({band.entry_angle, band.exit_angle, band.bottom, band.top});
   c.spindle_speed = m.spindle_speed;
   c.steady_from = fromPoint(m.steady_from);
   c.steady_to = fromPoint(m.steady_to);
@@ -193,12 +196,21 @@ void write(const CuttingCondition& c, M& m) {
   m.helix = c.tool.helix;
   m.corner_radius = c.tool.edge.corner_radius;
   m.edge_angle = c.tool.edge.edge_angle;
+  m.pitch = c.tool.pitch;
   m.cut_time_before = c.cut_time_before;
   m.spindle_speed = c.spindle_speed;
   m.feed_per_tooth = c.engagement.feed_per_tooth;
   m.axial_depth = c.engagement.axial_depth;
   m.entry_angle = c.engagement.entry;
   m.exit_angle = c.engagement.exit;
+  m.bands.clear();
+  for (const EngagementBand& band : c.engagement.bands) {
+    m.bands.emplace_back();
+    m.bands.back().entry_angle = band.entry;
+    m.bands.back().exit_angle = band.exit;
+    m.bands.back().bottom = band.bottom;
+    m.bands.back().top = band.top;
+  }
   setPoint(c.steady_from, m.steady_from);
   setPoint(c.steady_to, m.steady_to);
 }

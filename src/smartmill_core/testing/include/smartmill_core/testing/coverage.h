@@ -15,6 +15,10 @@ class Coverage {
   /// true one passes no more often. The number of runs of a test is fixed in advance, independent of its
   /// result.
   static constexpr int RUNS = 200;
+  /// Runs that detect deviations wrong by FACTOR_OF_FEW, where each error is expensive and a study computes
+  /// more.
+  static constexpr int FEW = 72;
+  static constexpr double FACTOR_OF_FEW = 2.0;
 
   void add(double error, double std_dev);
 
