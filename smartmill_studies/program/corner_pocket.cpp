@@ -64,12 +64,12 @@ MachineModel drawMachine(const MachineModel& base, const Draw& uniform) {
   return machine;
 }
 
-/// [m] Least limit of a contact from x to y, the directions of the feed in the corner.
-double limitOf(program::StabilityLimits& limits, double entry, double speed) {
+/// [m] Least limit of a contact while the feed turns from x by an angle [rad].
+double limitOf(program::StabilityLimits& limits, double entry, double speed, double turn = 0.5 * PI) {
+  constexpr int DIRECTIONS = 6;
   double least = 1e9;
-  for (int k = 0; k <= 6; ++k)
-    least =
-        std::min(least, limits.limit({{{entry, PI, 1.0 * MM}}}, units::radFromDeg(15.0 * k), false, speed));
+  for (int k = 0; k <= DIRECTIONS; ++k)
+    least = std::min(least, limits.limit({{{entry, PI, 1.0 * MM}}}, turn * k / DIRECTIONS, false, speed));
   return least;
 }
 
@@ -87,9 +87,11 @@ CornerCase drawCornerCase(const MachineModel& base, std::mt19937_64& random) {
     pocket.feed = uniform(0.03, 0.07) * MM;
     pocket.corner_margin = uniform(0.5, 0.8);
     const double velocity = pocket.feed * drawn.machine.tool->teeth * pocket.speed / units::TWO_PI;
-    if (constantWay(pocket, radius) / velocity < CORNER_TIME) continue;
+    const double way = constantWay(pocket, radius);
+    if (way / velocity < CORNER_TIME) continue;
     program::StabilityLimits limits(drawn.machine);
-    pocket.depth = limitOf(limits, entryOnArc(pocket, radius), pocket.speed) / pocket.corner_margin;
+    pocket.depth =
+        limitOf(limits, entryOnArc(pocket, radius), pocket.speed, way / pocket.radius) / pocket.corner_margin;
     if (!(pocket.depth >= LEAST_DEPTH && pocket.depth <= MOST_CORNER_DEPTH)) continue;
     const double line = PI - std::acos(1.0 - pocket.step / radius);
     const double on_lines = std::min(limits.limit({{{line, PI, 1.0 * MM}}}, 0.0, false, pocket.speed),

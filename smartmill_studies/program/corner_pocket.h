@@ -17,7 +17,8 @@ struct CornerPocket {
   double radius = 10e-3;       ///< [m] of its arc
   double speed = 420.0;        ///< [rad/s]
   double feed = 5e-5;          ///< [m] per tooth
-  double corner_margin = 0.0;  ///< [1] drawn stability limit over depth on the arc, least over its directions
+  double corner_margin = 0.0;  ///< [1] drawn stability limit over depth on the arc, least over the
+                               ///< directions of its constant engagement
   double line_margin = 0.0;    ///< [1] the same on the lines and in the roughing
 
   static constexpr double SIDE = 60e-3;  ///< [m] of the block

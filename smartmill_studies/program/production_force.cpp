@@ -66,6 +66,10 @@ double ProductionForce::logUniform(double low, double high) {
   return low * std::pow(high / low, unit_(random_));
 }
 
+double ProductionForce::feedPerTooth() const {
+  return feed_ / speed_ * TWO_PI / machine_.tool.teeth;
+}
+
 bool ProductionForce::chance(double mean_time) {
   return unit_(random_) * mean_time < STEP;
 }
@@ -193,7 +197,7 @@ Complex ProductionForce::cuttingForce(double turned) {
   const int teeth = machine_.tool.teeth;
   const double pitch = TWO_PI / teeth, height = depth_ / slices_;
   const double lag = machine_.tool.lag() * height;
-  const double feed = feed_ / speed_ * pitch;  // [m] a tooth
+  const double feed = feedPerTooth();
   const CuttingCoefficients& k = machine_.sharp;
   const double edge = 1.0 + worn_;
   Complex force = 0.0;

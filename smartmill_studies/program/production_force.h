@@ -52,6 +52,7 @@ class ProductionForce {
   void breakTooth(int tooth);
   const char* stage() const { return stage_; }          // of the present cut, for messages
   double meanForce() const { return mean_force_; }      // [N] of the last 0.1 s
+  double feedPerTooth() const;                          // [m]
   double cuttingTime() const { return cutting_time_; }  // [s]
 
  private:

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/steady_path.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::program {
 namespace {
@@ -105,6 +106,9 @@ void ToolMonitor::changeTool(const std::string& name) {
 }
 
 void ToolMonitor::handle(const CncState& state) {
+  const double teeth_per_second = tool_.teeth * state.spindle_speed / units::TWO_PI;
+  watch_.setFeed(state.connected && teeth_per_second > 0.0 ? std::optional(state.feed / teeth_per_second)
+                                                           : std::nullopt);
   const bool steady = condition_.kind == CuttingCondition::Kind::cut && state.connected && state.feed > 0.0 &&
                       onSteadyPath(condition_, state, parameters_.path_tolerance);
   if (!steady || (steady_since_ && state.stamp - steady_ > parameters_.maximum_gap)) steady_since_.reset();

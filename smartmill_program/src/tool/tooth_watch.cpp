@@ -27,11 +27,11 @@ constexpr double FORCE_SCATTER = 2.0;         // [1] standard deviations that ar
 constexpr double LEAST_CHIP_SHARE = 0.15;     // [1] of the chip in the force
 constexpr double MOST_TOLERANCE = 0.12;       // [1] of the mean force of the tool
 constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
-constexpr double LEAST_SHARE = 0.3;  // [1] of least_force that the teeth without the lost one must have
-constexpr double LEAST_OWN = 0.5, MOST_OWN = 2.0;  // [1] of the mean share: runout, as far as it is known
-constexpr double PHASE_TOLERANCE = 0.6;            // [rad] unknown depth and Fr / Ft
-constexpr double LEAST_STEP = 4.0;                 // [1] change over the drift of the references
-constexpr double DEVIATION = 0.3;  // [1] of the largest, from which on a step belongs to the loss
+constexpr double LEAST_SHARE = 0.3;      // [1] of least_force that the teeth without the lost one must have
+constexpr double LEAST_OWN = 0.5;        // [1] of the mean share: runout, as far as it is known
+constexpr double PHASE_TOLERANCE = 0.6;  // [rad] unknown depth and Fr / Ft
+constexpr double LEAST_STEP = 4.0;       // [1] change over the drift of the references
+constexpr double DEVIATION = 0.3;        // [1] of the largest, from which on a step belongs to the loss
 
 }  // namespace
 
@@ -186,7 +186,8 @@ std::optional<ToothLoss> ToothWatch::test() {
     run_ = 0;
     return std::nullopt;
   };
-  if (tool_.teeth < 2 || revolutions_.size() <= DELAY + (LEAST_REFERENCE - 1) * STEPS ||
+  if (tool_.teeth < 2 || (feed_ && *feed_ < parameters_.least_feed) ||
+      revolutions_.size() <= DELAY + (LEAST_REFERENCE - 1) * STEPS ||
       std::abs(now.force) < LEAST_SHARE * parameters_.least_force)
     return fail();
   const auto teeth = static_cast<double>(tool_.teeth);
@@ -210,10 +211,10 @@ std::optional<ToothLoss> ToothWatch::test() {
   const int lost = nearestTooth(at);
   // By runout a tooth has more or less than the mean share: the first harmonic of the shares is Z.
   const double harmonic = tool_.teeth == 2 ? 1.0 : 2.0;
-  const double own = std::clamp(
-      1.0 - harmonic / teeth * std::real(before.rotating * std::polar(1.0, tool_.toothAngle(lost) - phase_)) /
-                tooth,
-      LEAST_OWN, MOST_OWN);
+  const Complex uneven = harmonic / teeth * before.rotating / tooth;  // [1] of the mean share
+  if (std::abs(uneven) > 1.0) return fail();                          // runout keeps a tooth out of the cut
+  const double own =
+      std::max(1.0 - std::real(uneven * std::polar(1.0, tool_.toothAngle(lost) - phase_)), LEAST_OWN);
   if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * own / teeth - tolerance || ratio > 1.0 + tolerance ||
       std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE ||
       std::abs(nearAngle(at - tool_.toothAngle(lost), 0.0)) > PHASE_TOLERANCE)

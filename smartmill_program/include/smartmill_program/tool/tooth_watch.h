@@ -12,6 +12,7 @@ namespace smartmill::program {
 
 struct ToothWatchParameters {
   double least_force = 10.0;
+  double least_feed = 6e-6;
   double least_loss = 0.6;
   int reference_revolutions = 6;
   double force_change = 0.06;
@@ -20,6 +21,8 @@ struct ToothWatchParameters {
   void declare(ParameterTable& table) {
     table.number("least_force", least_force, "N", Range::positive(),
                  "mean force of a revolution below which it is no reference: the tool is out of the cut");
+    table.number("least_feed", least_feed, "m", Range::notNegative(),
+                 "feed per tooth below which no loss is reported: runout takes teeth out of such cuts");
     table.number("least_loss", least_loss, "1", Range::open(0.0, 1.0),
                  "share of the force of a tooth whose loss is reported");
     table.number("reference_revolutions", reference_revolutions, "1", Range::closed(3, 100),
@@ -75,7 +78,10 @@ struct RevolutionForce {
 /// Test (window-limited generalised likelihood ratio, Lai 1998): at each twelfth of a revolution the change D
 /// of Z over the last revolution against reference_revolutions that end two revolutions earlier. With normal
 /// noise of standard deviation s in each component, found from these revolutions, exp(-|D|^2 / (2 s^2)) is
-/// the probability of a larger change. A loss is reported when there is for 7/12 of a revolution
+/// the probability of a larger change. Where runout keeps a tooth out of the cut (first harmonic of the
+/// shares above their mean) or the feed per tooth is below least_feed, other teeth leave the cut with each
+/// change of the engagement, and nothing is reported. A loss is reported when there is for 7/12 of a
+/// revolution
 /// - a likelihood ratio according to false_alarm_hours,
 /// - the direction of one of the teeth,
 /// - the size of at least least_loss of this tooth. By runout its share differs from the mean one; the first
@@ -92,6 +98,8 @@ class ToothWatch {
 
   /// @param tool at least one tooth @param axial_depth [m] of the cut; 0: not known
   void setTool(const ToolGeometry& tool, double axial_depth = 0.0);
+  /// @param feed_per_tooth [m] at present; empty: not known
+  void setFeed(const std::optional<double>& feed_per_tooth) { feed_ = feed_per_tooth; }
 
   /// Samples in time order. @return a loss that this sample completes
   std::optional<ToothLoss> push(const ForceSample& sample);
@@ -133,7 +141,8 @@ class ToothWatch {
 
   ToothWatchParameters parameters_;
   ToolGeometry tool_;
-  double phase_ = 0.0;  // [rad] of the force of a tooth against its tip
+  double phase_ = 0.0;          // [rad] of the force of a tooth against its tip
+  std::optional<double> feed_;  // [m] per tooth
   long step_ = 0;
   bool whole_ = false;  // the present step has begun at its begin
   std::optional<Point> last_;

@@ -1,5 +1,8 @@
+#include <cmath>
+
 #include "model/effect_declaration.h"
 #include "smartmill_core/cutting/chip_rule.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::effects {
 namespace {
@@ -7,6 +10,9 @@ namespace {
 /// Offset between the axes of cutter and spindle: tooth j cuts at R + offset cos(angle - position of tooth
 /// j). The surface that it meets follows from the geometry.
 class Runout : public Effect {
+  static constexpr double TYPICAL = 15.0;  // [um]
+  static constexpr int DIRECTIONS = 8;
+
  public:
   static EffectKind declaration() {
     EffectKind kind{"runout", EffectStage::geometry, 20};
@@ -20,8 +26,14 @@ class Runout : public Effect {
         number("offset_um", "um", Range::notNegative()).named("tool axis off centre by").drawn(5.0, 25.0),
         angle("angle_deg")};
     kind.needs = {EffectNeed::cuts};
-    kind.forms =
-        always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0, 15.0}));
+    EffectForm form =
+        EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0, TYPICAL});
+    // Derivatives do not show that a tooth leaves the cut: it depends on the direction.
+    for (int k = 0; k < DIRECTIONS; ++k) {
+      const double angle = units::TWO_PI * k / DIRECTIONS;
+      form.startingAt({TYPICAL * std::cos(angle), TYPICAL * std::sin(angle)});
+    }
+    kind.forms = always(form);
     return kind;
   }
 
