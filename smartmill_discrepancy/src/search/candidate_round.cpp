@@ -29,11 +29,17 @@ void CandidateRound::run(bool screened_again) {
     if (!isWorthFitting(p)) continue;
     fitHypothesis(p);
   }
+  if (improved_) fitSimplerOnes();
   if (s.whole_records && !improved_) fitSupportedByTests();
 }
 
 bool CandidateRound::isRejected(const Hypothesis* hypothesis) const {
   return std::find(state_.rejected.begin(), state_.rejected.end(), hypothesis) != state_.rejected.end();
+}
+
+bool CandidateRound::isTried(const Hypothesis* hypothesis) const {
+  return std::any_of(candidates_.begin(), candidates_.end(),
+                     [&](const Candidate& r) { return r.hypothesis == hypothesis; });
 }
 
 bool CandidateRound::isWorthFitting(const PredictedGain& predicted) const {
@@ -46,6 +52,23 @@ bool CandidateRound::isWorthFitting(const PredictedGain& predicted) const {
            beyond * predicted.gain < state_.options.similar * best_predicted_);
 }
 
+// Predicted gains are those of small changes. An effect that has the same radii in fewer values is compared
+// whatever was predicted of it.
+void CandidateRound::fitSimplerOnes() {
+  const Member found = best_.state.members.back();
+  for (const PredictedGain& p : state_.screened) {
+    if (isTried(p.hypothesis) || isRejected(p.hypothesis) ||
+        p.hypothesis->coordinates.size() >= found.values.size() || state_.bench.cancelled())
+      continue;
+    const std::optional<std::vector<double>> values = equivalentValues(state_.quick, found, *p.hypothesis);
+    if (!values) continue;
+    PredictedGain simpler = p;
+    simpler.start = *values;
+    simpler.null.clear();
+    fitHypothesis(simpler);
+  }
+}
+
 // A small share of the whole excess may be all of it in the channels concerned: fits hypotheses that the
 // fitted tests accept.
 void CandidateRound::fitSupportedByTests() {
@@ -54,9 +77,7 @@ void CandidateRound::fitSupportedByTests() {
   std::size_t fitted = 0;
   for (const PredictedGain& p : s.screened) {
     if (fitted >= state_.options.max_supported || p.gain < s.options.min_gain || s.bench.cancelled()) return;
-    const bool tried = std::any_of(candidates_.begin(), candidates_.end(),
-                                   [&](const Candidate& r) { return r.hypothesis == p.hypothesis; });
-    if (tried || isRejected(p.hypothesis) || p.start.empty() ||
+    if (isTried(p.hypothesis) || isRejected(p.hypothesis) || p.start.empty() ||
         !ValidationResult::isAcceptedByFitted(fittedScale(s.quick, p)))
       continue;
     fitHypothesis(p);

@@ -21,7 +21,9 @@ class CandidateRound {
 
  private:
   bool isRejected(const Hypothesis* hypothesis) const;
+  bool isTried(const Hypothesis* hypothesis) const;
   bool isWorthFitting(const PredictedGain& predicted) const;
+  void fitSimplerOnes();
   void fitSupportedByTests();
   void fitHypothesis(const PredictedGain& predicted);
   bool ranksAhead(const FitResult& tried) const;
