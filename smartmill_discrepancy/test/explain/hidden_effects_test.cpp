@@ -13,7 +13,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-void expectFound(const EffectEntry& hidden) {
+void expectFound(const EffectEntry& hidden, const ExplainOptions& explain_options = {}) {
   const TemporaryFolder folder;
   MachineModel machine = real();
   machine.effects = {hidden};
@@ -24,7 +24,7 @@ void expectFound(const EffectEntry& hidden) {
         options.seed = seed;
         return sim::simulateTest(machine, test, 0.1, options);
       },
-      folder.file("."));
+      folder.file("."), explain_options);
   EXPECT_EQ(e.verdict, Verdict::explained);
   ASSERT_EQ(e.effects.size(), 1u);
   EXPECT_EQ(e.effects.front().name, hidden.name);
@@ -45,6 +45,14 @@ TEST(HiddenEffects, FindsAChippedTooth) {
   hidden.name = "tooth_radius";
   hidden.lists["offset_um"] = {4.0, 6.0, -13.0, 3.0};
   expectFound(hidden);
+}
+
+// Teeth are out of the cut in parts of it: more is predicted of four radii than of runout, and only one
+// effect is fitted for its predicted gain.
+TEST(HiddenEffects, FindsARunoutOfWhichLessIsPredictedThanOfTheRadiiOfTheTeeth) {
+  ExplainOptions options;
+  options.search.fitted_per_round = 1;
+  expectFound(effectEntry("runout", {{"offset_um", 55.0}, {"angle_deg", 100.0}}), options);
 }
 
 // All cuts have one depth: only the shape of the forces distinguishes a corner radius from other

@@ -56,6 +56,7 @@ struct Rig {
                       [this](const ToolReport& report) { reports.push_back(report); }};
   std::uint64_t index = 0;
   double transient_from = 1e9;  // [s]
+  double feed = 0.01;           // [m/s] of the controller
 
   /// Its coefficients are identified.
   void knowTool(const std::string& name) {
@@ -91,7 +92,8 @@ struct Rig {
       CncState state;
       state.stamp = t;
       state.connected = true;
-      state.feed = 0.01;
+      state.feed = feed;
+      state.spindle_speed = SPEED;
       state.axes = {"X", "Y", "Z"};
       state.position = {0.0, 0.1, 0.0};
       monitor.push(state);
@@ -116,6 +118,15 @@ TEST(ToolMonitor, ReportsALossWithoutACondition) {
   EXPECT_EQ(rig.reports[0].loss->tooth, 3);
   EXPECT_LE(rig.reports[0].stamp, 1.003 + 2.0 * TWO_PI / SPEED);
   EXPECT_FALSE(rig.reports[0].wear);
+}
+
+TEST(ToolMonitor, ReportsNoLossAtFeedsOfTheSizeOfTheRunout) {
+  Rig rig;
+  rig.feed = 4 * SPEED / TWO_PI * 5e-6;
+  const CuttingTeeth teeth = broken(1.003);
+  rig.run(0.0, 2.0, [&](double t, double a) { return teeth.at(t, a); });
+  rig.monitor.flush();
+  EXPECT_TRUE(rig.reports.empty());
 }
 
 // As force/compensated: the blocks from the loss on are transients.

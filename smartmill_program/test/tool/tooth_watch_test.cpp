@@ -1,6 +1,7 @@
 // Forces of test/tool/cutting_teeth.h; the loss of a tooth and what must not be taken for it.
 #include "smartmill_program/tool/tooth_watch.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -127,6 +128,49 @@ TEST(ToothWatch, RunoutIsNoLossAndDoesNotHideOne) {
   ASSERT_TRUE(loss);
   EXPECT_EQ(loss->tooth, 2);
   EXPECT_LE(loss->stamp * SPEED / TWO_PI, 32.3);
+}
+
+// Runout of 10 um at a feed of 8 um: some teeth are out of the cut. Where the arc narrows, the others leave
+// it one by one, which is a lost tooth by its force.
+TEST(ToothWatch, TeethThatRunoutKeepsOutOfTheCutAreNoLoss) {
+  struct Case {
+    int teeth;
+    double phase, revolutions;  // [rad] of the runout; until a tenth of the arc
+    bool up;
+  };
+  for (const Case& c : {Case{4, 1.5, 4.0, true}, Case{6, 1.5, 1.5, false}, Case{6, 3.0, 1.5, false},
+                        Case{6, 3.0, 2.5, false}}) {
+    CuttingTeeth teeth;
+    teeth.teeth = c.teeth;
+    teeth.feed = 8.0;
+    for (int j = 0; j < c.teeth; ++j)
+      teeth.radius[static_cast<std::size_t>(j)] = 10.0 * std::cos(TWO_PI / c.teeth * j + c.phase);
+    const auto narrows = [&](double n, CuttingTeeth& t) {
+      const double arc = PI * std::clamp(1.0 - (n - 20.0) / c.revolutions, 0.1, 1.0);
+      if (c.up) {
+        t.exit = arc;
+      } else {
+        t.entry = PI - arc;
+      }
+    };
+    EXPECT_FALSE(watch(teeth, 35.0, narrows)) << c.teeth << " teeth, " << c.revolutions << " revolutions";
+  }
+}
+
+TEST(ToothWatch, ReportsNothingBelowTheLeastFeed) {
+  CuttingTeeth teeth;
+  teeth.missing = 2;
+  teeth.missing_from = 20.3 * TWO_PI;
+  const ToothWatchParameters parameters;
+  for (const double feed : {0.0, 0.9 * parameters.least_feed, 1.1 * parameters.least_feed}) {
+    ToothWatch watch(parameters);
+    watch.setTool(toolOf(teeth.teeth));
+    watch.setFeed(feed);
+    bool reported = false;
+    for (int i = 0; i < 8000; ++i)
+      reported = watch.push(teeth.at(i / RATE, SPEED * i / RATE)).has_value() || reported;
+    EXPECT_EQ(reported, feed > parameters.least_feed) << feed;
+  }
 }
 
 struct Event {
