@@ -258,7 +258,8 @@ TEST_F(LinuxCncMachine, RunsAProgramWhoseMovesAreMarkedInTheStream) {
     // The angle is the integral of the speed over the servo period.
     ASSERT_NEAR(b.revolutions - a.revolutions, b.spindle_speed / units::TWO_PI * 1e-3, 1e-9);
     // Line 4 of the text (G90 before the program's first) is the move along x, line 5 the one along y.
-    // How long the marker stays after the move depends on when the controller's task runs again, so only moving samples count.
+    // How long the marker stays after the move depends on when the controller's task runs again, so only
+    // moving samples count.
     const bool x_moves = b.position[0] != a.position[0], y_moves = b.position[1] != a.position[1];
     first += x_moves && b.marker == 4.0 ? 1 : 0;
     second += y_moves && b.marker == 5.0 ? 1 : 0;
