@@ -103,6 +103,7 @@ void ToolMonitor::changeTool(const std::string& name) {
   const auto lost = losses_.find(name);
   loss_ = lost == losses_.end() ? std::nullopt : std::optional<ToothLoss>(lost->second);
   losses_.erase(name);
+  gap();  // the forces of another tool are no reference
 }
 
 void ToolMonitor::handle(const CncState& state) {
