@@ -20,16 +20,18 @@ constexpr std::size_t CONFIRM = 7;  // steps; a step of the feed passes the test
 /// [1] Mean force over (teeth x mean force of a tooth in its own frame): 1 for a narrow arc, pi / 4 for the
 /// chip and 2 / pi for the edge of a slot.
 constexpr double ARC = 0.85, ARC_STD = 0.16;
-constexpr double RADIAL_ANGLE = 0.45;      // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
-constexpr double UNKNOWN_DEPTH = 0.5;      // [1] tool radii
-constexpr double FORCE_TOLERANCE = 0.3;    // [1] of the mean force of a tooth
-constexpr double FORCE_SCATTER = 2.0;      // [1] standard deviations that are added to it
-constexpr double LEAST_CHIP_SHARE = 0.15;  // [1] of the chip in the force
-constexpr double MOST_TOLERANCE = 0.12;    // [1] of the mean force of the tool
-constexpr double LEAST_SHARE = 0.3;        // [1] of least_force that the teeth without the lost one must have
-constexpr double LEAST_OWN = 0.5;          // [1] of the mean share: runout, as far as it is known
-constexpr double LEAST_STEP = 4.0;         // [1] change over the drift of the references
-constexpr double DEVIATION = 0.3;          // [1] of the largest, from which on a step belongs to the loss
+constexpr double RADIAL_ANGLE = 0.45;         // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
+constexpr double UNKNOWN_DEPTH = 0.5;         // [1] tool radii
+constexpr double FORCE_TOLERANCE = 0.3;       // [1] of the mean force of a tooth
+constexpr double FORCE_SCATTER = 2.0;         // [1] standard deviations that are added to it
+constexpr double LEAST_CHIP_SHARE = 0.15;     // [1] of the chip in the force
+constexpr double MOST_TOLERANCE = 0.12;       // [1] of the mean force of the tool
+constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
+constexpr double LEAST_SHARE = 0.3;      // [1] of least_force that the teeth without the lost one must have
+constexpr double LEAST_OWN = 0.5;        // [1] of the mean share: runout, as far as it is known
+constexpr double PHASE_TOLERANCE = 0.6;  // [rad] unknown depth and Fr / Ft
+constexpr double LEAST_STEP = 4.0;       // [1] change over the drift of the references
+constexpr double DEVIATION = 0.3;        // [1] of the largest, from which on a step belongs to the loss
 
 }  // namespace
 
@@ -213,7 +215,9 @@ std::optional<ToothLoss> ToothWatch::test() {
   if (std::abs(uneven) > 1.0) return fail();                          // runout keeps a tooth out of the cut
   const double own =
       std::max(1.0 - std::real(uneven * std::polar(1.0, tool_.toothAngle(lost) - phase_)), LEAST_OWN);
-  if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * own / teeth - tolerance || ratio > 1.0 + tolerance)
+  if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * own / teeth - tolerance || ratio > 1.0 + tolerance ||
+      std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE ||
+      std::abs(nearAngle(at - tool_.toothAngle(lost), 0.0)) > PHASE_TOLERANCE)
     return fail();
   if (std::abs(change) < LEAST_STEP * before.drift) return fail();  // growing chatter
   const double loss = std::abs(change) / (tooth * own * std::abs(template_of_first));

@@ -83,6 +83,7 @@ struct RevolutionForce {
 /// change of the engagement, and nothing is reported. A loss is reported when there is for 7/12 of a
 /// revolution
 /// - a likelihood ratio according to false_alarm_hours,
+/// - the direction of one of the teeth,
 /// - the size of at least least_loss of this tooth. By runout its share differs from the mean one; the first
 ///   harmonic of the shares follows from Z before,
 /// - a mean force that this tooth leaves, compared with that of the references, extrapolated: entries, exits,
