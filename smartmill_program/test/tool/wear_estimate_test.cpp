@@ -128,9 +128,9 @@ TEST(WearEstimate, TheStandardDeviationCoversTheError) {
 }
 
 TEST(WearEstimate, NoneWithoutTangentialCoefficients) {
-  CuttingCoefficients unknown = SHARP;
-  unknown.kte = UNKNOWN;
-  EXPECT_EQ(wearOf(unknown, {}, SHARP, ENGAGEMENTS[0]).revolutions, 0u);
+  CuttingCoefficients sharp = SHARP;
+  sharp.kte = UNKNOWN;
+  EXPECT_EQ(wearOf(sharp, {}, SHARP, ENGAGEMENTS[0]).revolutions, 0u);
 }
 
 }  // namespace
