@@ -15,6 +15,17 @@
 
 namespace smartmill {
 
+/// Lines of JSON; an incomplete line is skipped.
+inline std::vector<nlohmann::json> readJsonLines(const std::string& file) {
+  std::vector<nlohmann::json> lines;
+  std::ifstream in(file);
+  for (std::string text; std::getline(in, text);) {
+    nlohmann::json line = nlohmann::json::parse(text, nullptr, false);
+    if (!line.is_discarded()) lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
 /// Options of one case of a study, as used by smartmill_studies/runner/run: --case K --cases N --seed S
 /// prints one line of JSON, which is the same in every run on every host. --score LINES prints the figures of
 /// the study from the lines of all cases.
@@ -40,10 +51,11 @@ struct StudyCase {
   }
   void print(const nlohmann::json& line) const { std::printf("%s\n", line.dump().c_str()); }
 
-  /// Runs the one case, or all of them with the figures at the end.
+  /// Runs the one case, or all of them with the figures at the end; with --score only the figures.
   /// @param line of a case by its number @param score prints the figures
   template <class Line, class Score>
   void run(int cases, const Line& line, const Score& score) const {
+    if (scores()) return score(readJsonLines(lines));
     check(cases);
     if (one()) return print(line(number));
     std::vector<nlohmann::json> all;
@@ -63,17 +75,6 @@ inline std::uint64_t seedOfCase(std::uint64_t seed, int number) {
   std::vector<std::uint32_t> words(2);
   mixed.generate(words.begin(), words.end());
   return (static_cast<std::uint64_t>(words[0]) << 32) | words[1];
-}
-
-/// Lines of JSON; an incomplete line is skipped.
-inline std::vector<nlohmann::json> readJsonLines(const std::string& file) {
-  std::vector<nlohmann::json> lines;
-  std::ifstream in(file);
-  for (std::string text; std::getline(in, text);) {
-    nlohmann::json line = nlohmann::json::parse(text, nullptr, false);
-    if (!line.is_discarded()) lines.push_back(std::move(line));
-  }
-  return lines;
 }
 
 /// A number of a line; NaN for null, which represents NaN and infinity.

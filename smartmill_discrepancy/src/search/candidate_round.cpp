@@ -61,11 +61,7 @@ void CandidateRound::fitSimplerOnes() {
         p.hypothesis->coordinates.size() >= found.values.size() || state_.bench.cancelled())
       continue;
     const std::optional<std::vector<double>> values = equivalentValues(state_.quick, found, *p.hypothesis);
-    if (!values) continue;
-    PredictedGain simpler = p;
-    simpler.start = *values;
-    simpler.null.clear();
-    fitHypothesis(simpler);
+    if (values) fitFrom(p, *values);
   }
 }
 
@@ -86,11 +82,15 @@ void CandidateRound::fitSupportedByTests() {
 }
 
 void CandidateRound::fitHypothesis(const PredictedGain& predicted) {
+  std::optional<std::vector<double>> in_place;
+  if (improved_) in_place = equivalentValues(state_.quick, best_.state.members.back(), *predicted.hypothesis);
+  fitFrom(predicted, bestStart(state_.quick, state_.now, predicted, in_place));
+}
+
+void CandidateRound::fitFrom(const PredictedGain& predicted, const std::vector<double>& start) {
   SearchState& s = state_;
   FitState with = s.now.state;
-  std::optional<std::vector<double>> in_place;
-  if (improved_) in_place = equivalentValues(s.quick, best_.state.members.back(), *predicted.hypothesis);
-  with.members.push_back({predicted.hypothesis, bestStart(s.quick, s.now, predicted, in_place)});
+  with.members.push_back({predicted.hypothesis, start});
   FitOptions options = FitOptions::toCompare();
   options.to_beat = std::min(best_.chi2 + best_.penalty, s.now.chi2 + s.now.penalty - required_gain_);
   FitResult tried;

@@ -26,6 +26,7 @@ class CandidateRound {
   void fitSimplerOnes();
   void fitSupportedByTests();
   void fitHypothesis(const PredictedGain& predicted);
+  void fitFrom(const PredictedGain& predicted, const std::vector<double>& start);
   bool ranksAhead(const FitResult& tried) const;
   bool isImprovement(const FitResult& tried) const;
 

@@ -137,12 +137,6 @@ void score(const std::vector<nlohmann::json>& lines) {
   std::printf("%d without chatter, %d in another block; %d losses of the path\n", none, other, lost);
 }
 
-void run(const Arguments& a) {
-  if (a.study.scores()) return score(readJsonLines(a.study.lines));
-  a.study.run(
-      a.cases, [&](int number) { return lineOf(a, number); }, score);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -156,5 +150,8 @@ int main(int argc, char** argv) {
   line.option("--model", a.model, "machine model").showDefault();
   line.option("--folder", a.folder, "folder for the models of the machines").showDefault();
   line.option("--seed", a.seed, "of machines, pockets and noise").showDefault();
-  return runProgram(line, argc, argv, [&] { run(a); });
+  return runProgram(line, argc, argv, [&] {
+    a.study.run(
+        a.cases, [&](int number) { return lineOf(a, number); }, score);
+  });
 }

@@ -310,7 +310,6 @@ int main(int argc, char** argv) {
   line.option("--seed", a.seed, "of all draws").showDefault();
   study.addScore(line);
   return runProgram(line, argc, argv, [&] {
-    if (study.scores()) return score(readJsonLines(study.lines));
     study.run(
         a.cases, [&](int number) { return caseOf(a, number); }, score);
   });

@@ -118,13 +118,6 @@ void score(const std::vector<nlohmann::json>& lines) {
               all[2]);
 }
 
-void run(const Arguments& a) {
-  if (a.study.scores()) return score(readJsonLines(a.study.lines));
-  if (a.output.empty()) throw UsageError("-o: expected a folder for campaigns and reports");
-  a.study.run(
-      a.cases, [&](int number) { return lineOf(a, number); }, score);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -137,5 +130,10 @@ int main(int argc, char** argv) {
   line.option("-o", a.output, "folder for the campaigns and reports");
   line.option("--model", a.model, "machine model with tool, coefficients and workpiece").showDefault();
   line.option("--seed", a.seed, "of causes, pockets and noise").showDefault();
-  return runProgram(line, argc, argv, [&] { run(a); });
+  return runProgram(line, argc, argv, [&] {
+    if (a.output.empty() && !a.study.scores())
+      throw UsageError("-o: expected a folder for campaigns and reports");
+    a.study.run(
+        a.cases, [&](int number) { return lineOf(a, number); }, score);
+  });
 }

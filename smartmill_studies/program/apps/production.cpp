@@ -188,12 +188,6 @@ void score(const std::vector<nlohmann::json>& lines) {
               mean["air"], mean["lost"], mean["time"]);
 }
 
-void run(const Arguments& a) {
-  if (a.study.scores()) return score(readJsonLines(a.study.lines));
-  a.study.run(
-      a.cases, [&](int number) { return lineOf(a, number); }, score);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -208,5 +202,8 @@ int main(int argc, char** argv) {
   line.flag("--instrument-errors", a.instrument_errors,
             "gain and zero of the dynamometer have errors of the size that the shipped parameters state");
   line.option("--seed", a.seed, "of machines, pockets and noise").showDefault();
-  return runProgram(line, argc, argv, [&] { run(a); });
+  return runProgram(line, argc, argv, [&] {
+    a.study.run(
+        a.cases, [&](int number) { return lineOf(a, number); }, score);
+  });
 }
