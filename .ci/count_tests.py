@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ElementTree
 
 # What needs packages that are optional (./setup --with-linuxcnc, --with-fleet, --with-instruments, --with-docs; open62541, which Debian 12 lacks)
 # may be skipped everywhere.
-OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "SoundDriver", "SigrokDriver", "IioDriver", "ComediDriver", "StudiesEngine", "site_test.SiteTest", "OpcUaServer", "OpcUaNodeTest",
+OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "Sound", "SoundDriver", "SigrokDriver", "IioDriver", "ComediDriver", "StudiesEngine", "site_test.SiteTest", "OpcUaServer", "OpcUaNodeTest",
             "graph_tutorials_test.LinuxCncTutorialTest")
 
 
