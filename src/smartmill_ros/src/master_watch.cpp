@@ -12,6 +12,7 @@
 #include <ros/xmlrpc_manager.h>
 
 #include <XmlRpcClient.h>
+#include <XmlRpcDispatch.h>
 
 #include "smartmill_ros/kept_messages.h"
 
@@ -21,7 +22,9 @@ namespace {
 using Value = XmlRpc::XmlRpcValue;
 
 constexpr std::chrono::seconds PERIOD{1};
-constexpr int LOOKS_PER_COPY = 10;  // of the parameters, which can be large
+constexpr double ANSWER_PERIOD = 0.01;  // [s] between two looks for an answer
+constexpr int MOST_LOOKS = 500;         // for an answer
+constexpr int LOOKS_PER_COPY = 10;      // of the parameters, which can be large
 /// After which all nodes have registered what they publish. The master sends each list of publishers to the
 /// registered subscribers, which would leave those that are not in the list yet.
 constexpr int LOOKS_TO_SUBSCRIBE = 2;
@@ -39,18 +42,6 @@ bool call(const std::string& method, const std::vector<std::string>& arguments, 
   words.insert(words.end(), arguments.begin(), arguments.end());
   Value response;
   return ros::master::execute(method, list(words), response, result, false);
-}
-
-/// Call of this node's own XML-RPC server, which lists its topics.
-bool callSelf(const std::string& method, const Value& arguments, Value& result) {
-  std::string host;
-  std::uint32_t port = 0;
-  if (!ros::network::splitURI(ros::XMLRPCManager::instance()->getServerURI(), host, port)) return false;
-  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
-  Value response;
-  if (!client.execute(method.c_str(), arguments, response) || response.size() != 3) return false;
-  result = response[2];
-  return true;
 }
 
 /// Whether entries [name, [nodes]] of the master's state contain this node; calls use with each such name.
@@ -85,17 +76,38 @@ MasterWatch::~MasterWatch() {
 }
 
 void MasterWatch::watch() {
+  while (!stopsWithin(PERIOD)) look();
+}
+
+bool MasterWatch::stopsWithin(std::chrono::seconds time) {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (!stopped_.wait_for(lock, PERIOD, [this] { return stops_; })) {
-    lock.unlock();
-    if (ros::ok()) look();
-    lock.lock();
+  return stopped_.wait_for(lock, time, [this] { return stops_; });
+}
+
+/// Call of this node's own XML-RPC server, which lists its topics. A server that has ended answers no more.
+bool MasterWatch::callSelf(const std::string& method, const Value& arguments, Value& result) {
+  std::string host;
+  std::uint32_t port = 0;
+  if (!ros::network::splitURI(ros::XMLRPCManager::instance()->getServerURI(), host, port)) return false;
+  XmlRpc::XmlRpcClient client(host.c_str(), static_cast<int>(port), "/");
+  Value response;
+  if (!client.executeNonBlock(method.c_str(), arguments)) return false;
+  XmlRpc::XmlRpcDispatch dispatch;
+  dispatch.addSource(&client, XmlRpc::XmlRpcDispatch::WritableEvent | XmlRpc::XmlRpcDispatch::Exception);
+  for (int look = 0; !client.executeCheckDone(response); ++look) {
+    if (look == MOST_LOOKS || stopsWithin(std::chrono::seconds(0))) return false;
+    dispatch.work(ANSWER_PERIOD);
   }
+  if (client.isFault() || response.getType() != Value::TypeArray || response.size() != 3) return false;
+  result = response[2];
+  return true;
 }
 
 void MasterWatch::look() {
   Value state;
-  if (!call("getSystemState", {}, state) || state.size() != 3) {
+  const bool answers = call("getSystemState", {}, state) && state.size() == 3;
+  if (ros::isShuttingDown()) return;  // unregisters, or has done so
+  if (!answers) {
     if (!is_gone_) ROS_ERROR("no answer of the ROS master at %s", ros::master::getURI().c_str());
     is_gone_ = true;
     return;

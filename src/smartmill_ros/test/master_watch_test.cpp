@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 #include <ros/ros.h>
+#include <ros/xmlrpc_manager.h>
 #include <smartmill_msgs/Follow.h>
 #include <smartmill_msgs/SpindleAngle.h>
 
@@ -93,6 +94,27 @@ TEST(MasterWatch, RegistersTheNodeAtANewMaster) {
     EXPECT_EQ(status, 0);
     EXPECT_TRUE(eventually([&] { return received == 2; }));
     spinner.stop();
+  }
+  {
+    // The server of this process ends before its answer, as at a shutdown.
+    const ros::Publisher angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 10);
+    std::atomic<bool> called{false}, released{false}, answered{false};
+    ros::XMLRPCManager& server = *ros::XMLRPCManager::instance();
+    server.unbind("getPublications");
+    server.bind("getPublications", [&](XmlRpc::XmlRpcValue&, XmlRpc::XmlRpcValue&) {
+      called = true;
+      eventually([&] { return released.load(); });
+      answered = true;
+    });
+    {
+      const MasterWatch watch(nh);
+      ros::WallDuration(3.0).sleep();  // known to the master
+      end(running, SIGKILL);
+      running = start(master);
+      EXPECT_TRUE(eventually([&] { return called.load(); }));
+    }
+    EXPECT_FALSE(answered);
+    released = true;
   }
   ros::shutdown();
   end(running, SIGTERM);

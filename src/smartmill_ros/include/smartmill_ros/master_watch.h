@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <map>
 #include <mutex>
@@ -26,6 +27,8 @@ class MasterWatch {
 
  private:
   void watch();
+  bool stopsWithin(std::chrono::seconds time);
+  bool callSelf(const std::string& method, const XmlRpc::XmlRpcValue& arguments, XmlRpc::XmlRpcValue& result);
   void look();
   void remember(XmlRpc::XmlRpcValue& services);
   void rememberParameters();
