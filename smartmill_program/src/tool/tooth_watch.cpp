@@ -20,18 +20,18 @@ constexpr std::size_t CONFIRM = 7;  // steps; a step of the feed passes the test
 /// [1] Mean force over (teeth x mean force of a tooth in its own frame): 1 for a narrow arc, pi / 4 for the
 /// chip and 2 / pi for the edge of a slot.
 constexpr double ARC = 0.85, ARC_STD = 0.16;
-constexpr double RADIAL_ANGLE = 0.45;         // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
-constexpr double UNKNOWN_DEPTH = 0.5;         // [1] tool radii
-constexpr double FORCE_TOLERANCE = 0.3;       // [1] of the mean force of a tooth
-constexpr double FORCE_SCATTER = 2.0;         // [1] standard deviations that are added to it
-constexpr double LEAST_CHIP_SHARE = 0.15;     // [1] of the chip in the force
-constexpr double MOST_TOLERANCE = 0.12;       // [1] of the mean force of the tool
-constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
-constexpr double LEAST_SHARE = 0.3;      // [1] of least_force that the teeth without the lost one must have
-constexpr double LEAST_OWN = 0.5;        // [1] of the mean share: runout, as far as it is known
-constexpr double PHASE_TOLERANCE = 0.6;  // [rad] unknown depth and Fr / Ft
-constexpr double LEAST_STEP = 4.0;       // [1] change over the drift of the references
-constexpr double DEVIATION = 0.3;        // [1] of the largest, from which on a step belongs to the loss
+constexpr double RADIAL_ANGLE = 0.45;      // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
+constexpr double UNKNOWN_DEPTH = 0.5;      // [1] tool radii
+constexpr double LEAST_CHIP_SHARE = 0.15;  // [1] of the chip in the force
+constexpr double LEAST_SHARE = 0.3;        // [1] of least_force that the teeth without the lost one must have
+constexpr double LEAST_OWN = 0.5;          // [1] of the mean share: runout, as far as it is known
+// Standard deviations of what a loss leaves as it was, and the largest sum of squares over them.
+constexpr double PHASE_STD = 0.6;   // [rad] unknown depth and Fr / Ft
+constexpr double FORCE_STD = 0.17;  // [1] of the mean force, over the root of the teeth
+constexpr double UNEVEN_STD = 0.8;  // [1] of the mean share
+constexpr double DRIFT_STD = 0.14;  // [1] of the change
+constexpr double MOST_DEVIATION = 1.5;
+constexpr double DEVIATION = 0.3;  // [1] of the largest, from which on a step belongs to the loss
 
 }  // namespace
 
@@ -138,10 +138,6 @@ ToothWatch::Reference ToothWatch::reference() const {
   const Complex oldest = revolutionBefore(DELAY + (found.count - 1) * STEPS).force;
   const Complex slope = (newest - oldest) / (count - 1.0);  // a revolution
   found.force = newest + static_cast<double>(DELAY) / static_cast<double>(STEPS) * slope;
-  for (std::size_t k = 0; k < found.count; ++k)
-    found.force_variance +=
-        std::norm(revolutionBefore(DELAY + k * STEPS).force - (newest - static_cast<double>(k) * slope));
-  found.force_variance /= count - 2.0;
   found.rotating /= count;
   for (std::size_t k = 0; k < found.count; ++k)
     found.variance += std::norm(revolutionBefore(DELAY + k * STEPS).rotating - found.rotating);
@@ -186,8 +182,7 @@ std::optional<ToothLoss> ToothWatch::test() {
     run_ = 0;
     return std::nullopt;
   };
-  if (tool_.teeth < 2 || (feed_ && *feed_ < parameters_.least_feed) ||
-      revolutions_.size() <= DELAY + (LEAST_REFERENCE - 1) * STEPS ||
+  if (tool_.teeth < 2 || revolutions_.size() <= DELAY + (LEAST_REFERENCE - 1) * STEPS ||
       std::abs(now.force) < LEAST_SHARE * parameters_.least_force)
     return fail();
   const auto teeth = static_cast<double>(tool_.teeth);
@@ -198,9 +193,6 @@ std::optional<ToothLoss> ToothWatch::test() {
 
   const double tooth = std::abs(before.force) / (teeth * ARC);
   const double ratio = std::abs(now.force) / std::abs(before.force);
-  const double tolerance = std::min(
-      FORCE_TOLERANCE / teeth + FORCE_SCATTER * std::sqrt(before.force_variance) / std::abs(before.force),
-      MOST_TOLERANCE);
   const Complex change = now.rotating - before.rotating;
   const double chip_share = std::clamp(1.0 - teeth * (1.0 - ratio), 0.0, 1.0);
   const Complex template_of_first = 1.0 - chip_share * std::polar(1.0, units::TWO_PI / teeth);
@@ -212,18 +204,19 @@ std::optional<ToothLoss> ToothWatch::test() {
   // By runout a tooth has more or less than the mean share: the first harmonic of the shares is Z.
   const double harmonic = tool_.teeth == 2 ? 1.0 : 2.0;
   const Complex uneven = harmonic / teeth * before.rotating / tooth;  // [1] of the mean share
-  if (std::abs(uneven) > 1.0) return fail();                          // runout keeps a tooth out of the cut
   const double own =
       std::max(1.0 - std::real(uneven * std::polar(1.0, tool_.toothAngle(lost) - phase_)), LEAST_OWN);
-  if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * own / teeth - tolerance || ratio > 1.0 + tolerance ||
-      std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE ||
-      std::abs(nearAngle(at - tool_.toothAngle(lost), 0.0)) > PHASE_TOLERANCE)
-    return fail();
-  if (std::abs(change) < LEAST_STEP * before.drift) return fail();  // growing chatter
+  const double least_ratio = 1.0 - (1.0 - LEAST_CHIP_SHARE) * own / teeth;
+  const double deviation =
+      std::norm(nearAngle(at - tool_.toothAngle(lost), 0.0) / PHASE_STD) +
+      std::norm((ratio - std::clamp(ratio, least_ratio, 1.0)) * std::sqrt(teeth) / FORCE_STD) +
+      std::norm(uneven / UNEVEN_STD) + std::norm(before.drift / std::abs(change) / DRIFT_STD) +
+      (feed_ ? std::norm(parameters_.usual_runout / *feed_) : 0.0);
   const double loss = std::abs(change) / (tooth * own * std::abs(template_of_first));
   const double revolution = now.time - revolutionBefore(STEPS).time;  // [s]
   const double tests = parameters_.false_alarm_hours * 3600.0 / revolution;
-  if (loss < parameters_.least_loss || llr < std::log(std::max(tests, 1.0))) return fail();
+  if (!(deviation < MOST_DEVIATION) || loss < parameters_.least_loss || llr < std::log(std::max(tests, 1.0)))
+    return fail();
   if (++run_ < CONFIRM) return {};
 
   ToothLoss found;

@@ -122,7 +122,7 @@ TEST(ToolMonitor, ReportsALossWithoutACondition) {
 
 TEST(ToolMonitor, ReportsNoLossAtFeedsOfTheSizeOfTheRunout) {
   Rig rig;
-  rig.feed = 4 * SPEED / TWO_PI * 5e-6;
+  rig.feed = 4 * SPEED / TWO_PI * 4e-6;
   const CuttingTeeth teeth = broken(1.003);
   rig.run(0.0, 2.0, [&](double t, double a) { return teeth.at(t, a); });
   rig.monitor.flush();

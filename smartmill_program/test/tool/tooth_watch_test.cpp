@@ -157,19 +157,19 @@ TEST(ToothWatch, TeethThatRunoutKeepsOutOfTheCutAreNoLoss) {
   }
 }
 
-TEST(ToothWatch, ReportsNothingBelowTheLeastFeed) {
+TEST(ToothWatch, ReportsNothingWhereTheUsualRunoutIsTheFeed) {
   CuttingTeeth teeth;
   teeth.missing = 2;
   teeth.missing_from = 20.3 * TWO_PI;
   const ToothWatchParameters parameters;
-  for (const double feed : {0.0, 0.9 * parameters.least_feed, 1.1 * parameters.least_feed}) {
+  for (const double feed : {0.0, 0.8 * parameters.usual_runout, 1.2 * parameters.usual_runout}) {
     ToothWatch watch(parameters);
     watch.setTool(toolOf(teeth.teeth));
     watch.setFeed(feed);
     bool reported = false;
     for (int i = 0; i < 8000; ++i)
       reported = watch.push(teeth.at(i / RATE, SPEED * i / RATE)).has_value() || reported;
-    EXPECT_EQ(reported, feed > parameters.least_feed) << feed;
+    EXPECT_EQ(reported, feed > parameters.usual_runout) << feed;
   }
 }
 

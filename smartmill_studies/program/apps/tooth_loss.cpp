@@ -1,7 +1,7 @@
 // rosrun smartmill_studies program_tooth_loss: a tooth broken off in a drawn cut of drawn machines, and false
 // reports in hours of production without a loss. Developed with seeds 1 to 3, 2028 to 2030 (the last two
-// after a count of each), 3001 to 3004 and, after counts of each, 2031 and 2032; counted with seed 2033:
-//   --cases 50 --seed 2033; --cases 50 --seed 2033 --least-load 0; --cases 200 --seed 2033 --hours 0.5
+// after a count of each), 3001 to 3004, 3101 and, after counts of each, 2031 to 2033; counted with seed 2034:
+//   --cases 50 --seed 2034; --cases 50 --seed 2034 --least-load 0; --cases 200 --seed 2034 --hours 0.5
 
 #include <cmath>
 #include <cstdio>

@@ -12,7 +12,7 @@ namespace smartmill::program {
 
 struct ToothWatchParameters {
   double least_force = 10.0;
-  double least_feed = 6e-6;
+  double usual_runout = 6e-6;
   double least_loss = 0.6;
   int reference_revolutions = 6;
   double force_change = 0.06;
@@ -21,8 +21,8 @@ struct ToothWatchParameters {
   void declare(ParameterTable& table) {
     table.number("least_force", least_force, "N", Range::positive(),
                  "mean force of a revolution below which it is no reference: the tool is out of the cut");
-    table.number("least_feed", least_feed, "m", Range::notNegative(),
-                 "feed per tooth below which no loss is reported: runout takes teeth out of such cuts");
+    table.number("usual_runout", usual_runout, "m", Range::notNegative(),
+                 "of tools in their holders: at a feed per tooth of this size it takes teeth out of the cut");
     table.number("least_loss", least_loss, "1", Range::open(0.0, 1.0),
                  "share of the force of a tooth whose loss is reported");
     table.number("reference_revolutions", reference_revolutions, "1", Range::closed(3, 100),
@@ -78,16 +78,15 @@ struct RevolutionForce {
 /// Test (window-limited generalised likelihood ratio, Lai 1998): at each twelfth of a revolution the change D
 /// of Z over the last revolution against reference_revolutions that end two revolutions earlier. With normal
 /// noise of standard deviation s in each component, found from these revolutions, exp(-|D|^2 / (2 s^2)) is
-/// the probability of a larger change. Where runout keeps a tooth out of the cut (first harmonic of the
-/// shares above their mean) or the feed per tooth is below least_feed, other teeth leave the cut with each
-/// change of the engagement, and nothing is reported. A loss is reported when there is for 7/12 of a
-/// revolution
+/// the probability of a larger change. A loss is reported when there is for 7/12 of a revolution
 /// - a likelihood ratio according to false_alarm_hours,
-/// - the direction of one of the teeth,
-/// - the size of at least least_loss of this tooth. By runout its share differs from the mean one; the first
+/// - the size of at least least_loss of a tooth. By runout its share differs from the mean one; the first
 ///   harmonic of the shares follows from Z before,
-/// - a mean force that this tooth leaves, compared with that of the references, extrapolated: entries, exits,
-///   feeds and overrides change it otherwise.
+/// - a small sum of squares of the deviations from a loss, each over its standard deviation: direction of D
+///   from that of the nearest tooth; mean force, compared with that of the references, extrapolated, outside
+///   of what this tooth leaves (entries, exits, feeds and overrides change it otherwise); drift of Z before
+///   (growing chatter); unevenness of the shares, and usual_runout over the feed per tooth (where runout
+///   keeps a tooth out of the cut, others leave it with each change of the engagement).
 ///
 /// A tool with one tooth has no such test: its loss is the end of the force. Requires 12 samples in a
 /// revolution.
@@ -125,7 +124,6 @@ class ToothWatch {
     std::size_t count = 0;
     std::complex<double> force;     // [N] mean, extrapolated to the present
     std::complex<double> rotating;  // [N] mean
-    double force_variance = 0.0;    // [N2] about the line that is extrapolated
     double drift = 0.0;             // [N] newest of rotating against the mean
     double variance = 0.0;          // [N2] of a component of rotating
   };
