@@ -106,7 +106,7 @@ void AngleSources::setControllerSpeed(double speed) {
 }
 
 void AngleSources::push(const CuttingCondition& condition) {
-  teeth_ = condition.kind == CuttingCondition::Kind::cut ? static_cast<std::size_t>(condition.tool.teeth) : 0;
+  teeth_ = condition.isInWork() ? static_cast<std::size_t>(condition.tool.teeth) : 0;
   setCut();
 }
 

@@ -56,7 +56,7 @@ void SegmentRecorder::handle(const CuttingCondition& condition) {
 }
 
 void SegmentRecorder::handle(const CncState& state) {
-  if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
+  if (!condition_ || !condition_->isSteady()) return;
   const bool cut = condition_->kind == CuttingCondition::Kind::cut;
   const bool path =
       !cut || (isPlain(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));

@@ -136,7 +136,7 @@ bool ForceCompensation::hasDynamics() const {
 
 // A piezoelectric sensor drifts; its mean without cutting is its zero.
 void ForceCompensation::updateZero(const ForceBlock& measured) {
-  if (!condition_ || condition_->kind == CuttingCondition::Kind::cut || measured.force[0].empty()) return;
+  if (!condition_ || condition_->isInWork() || measured.force[0].empty()) return;
   const double length = static_cast<double>(measured.force[0].size());
   const double weight = std::min(1.0, length / measured.sample_rate / parameters_.zero_time);
   for (std::size_t axis = 0; axis < 3; ++axis) {

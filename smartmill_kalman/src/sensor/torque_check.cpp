@@ -65,8 +65,7 @@ void TorqueCheck::handle(const CncState& state) {
 }
 
 void TorqueCheck::handle(const LoadSample& sample) {
-  const bool known =
-      condition_ && condition_->kind != CuttingCondition::Kind::none && sample.spindle_speed > 0.0;
+  const bool known = condition_ && condition_->isSteady() && sample.spindle_speed > 0.0;
   if (!known || !(std::abs(sample.spindle_speed - condition_->spindle_speed) <=
                   SPEED_TOLERANCE * condition_->spindle_speed)) {
     at_speed_since_ = NEVER;

@@ -21,8 +21,8 @@ void TuningRecords::handle(const CuttingCondition& condition) {
 }
 
 void TuningRecords::handle(const SampleBlock& forces) {
-  if (!kind_ || *kind_ == CuttingCondition::Kind::none || complete_ || !(speed_ > 0.0)) return;
-  const bool in_cut = *kind_ == CuttingCondition::Kind::cut;
+  const bool in_cut = kind_ == CuttingCondition::Kind::cut;
+  if ((!in_cut && kind_ != CuttingCondition::Kind::air) || complete_ || !(speed_ > 0.0)) return;
   TuningRecord& record = in_cut ? cut_ : air_;
   auto& samples = in_cut ? record.cut : record.air;
   const bool is_broken =

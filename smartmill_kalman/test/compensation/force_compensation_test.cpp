@@ -251,6 +251,12 @@ TEST(ForceCompensation, estimatesTheZeroOfTheSensorAndTheCorrelationOfTheInnovat
   EXPECT_NEAR(compensation.health().innovation_ratio, 1.0, 0.2);
   feed(1000, 0.9);
   EXPECT_GT(compensation.health().innovation_correlation, 0.5);
+  const std::array<double, 3> zero = compensation.health().zero;
+  CuttingCondition unsteady;
+  unsteady.kind = CuttingCondition::Kind::unsteady;
+  compensation.handle(unsteady);
+  feed(2000, 0.0);
+  EXPECT_EQ(compensation.health().zero, zero);
 }
 
 TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {

@@ -247,6 +247,21 @@ TEST(SpindleForceSensor, TakesOffsetAndDriftOut) {
   EXPECT_LT(rig.sensor.health().zero_std, 0.01);
 }
 
+TEST(SpindleForceSensor, TheForceOfAnUnsteadyCutIsNoOffset) {
+  Rig rig;
+  rig.noise = 0.02;
+  rig.condition(CuttingCondition::Kind::air);
+  rig.run(8.0, 0.0, [](double) { return std::array<double, 3>{0.0, 0.0, 0.0}; });
+  const auto cut = [](double) { return std::array<double, 3>{200.0, 100.0, 50.0}; };
+  for (const auto kind : {CuttingCondition::Kind::unsteady, CuttingCondition::Kind::cut}) {
+    rig.condition(kind);
+    const auto out = rig.run(4.0, 0.0, cut);
+    EXPECT_LT(rmsFrom(out[0], 200.0), 0.65);
+    EXPECT_LT(rmsFrom(out[1], 100.0), 0.5);
+    EXPECT_LT(rmsFrom(out[2], 50.0), 1.6);
+  }
+}
+
 TEST(SpindleForceSensor, UnbalanceLearntInTheAirIsTakenOffAtAnySpeed) {
   Rig rig;
   rig.mass = 2e-5;

@@ -9,7 +9,7 @@
 namespace smartmill::loadmeter {
 
 void AxisDriveRecorder::handle(const CuttingCondition& condition) {
-  cutting_ = condition.kind == CuttingCondition::Kind::cut;
+  cutting_ = condition.isInWork();
   open_ = false;
 }
 

@@ -21,18 +21,24 @@ smartmill_msgs::IdentifyAxisDriveResult resultOf(std::uint8_t code, const std::s
   return result;
 }
 
+/// Passes the messages of a topic on; one that is not valid is announced.
+template <class Message>
+ros::Subscriber hear(ros::NodeHandle& nh, const char* topic, AxisDriveRecorder& recorder) {
+  return nh.subscribe<Message>(topic, QUEUE, [topic, &recorder](const typename Message::ConstPtr& message) {
+    try {
+      recorder.handle(fromMsg(*message));
+    } catch (const Error& error) {
+      ROS_ERROR_THROTTLE(1.0, "%s: %s", topic, error.what());
+    }
+  });
+}
+
 }  // namespace
 
 AxisDriveServer::AxisDriveServer(ros::NodeHandle nh, double timeout)
     : timeout_(timeout),
-      servo_(nh.subscribe<smartmill_msgs::SampleBlock>(
-          names::SERVO_RECORD, QUEUE,
-          [this](const smartmill_msgs::SampleBlock::ConstPtr& block) { recorder_.handle(fromMsg(*block)); })),
-      condition_(nh.subscribe<smartmill_msgs::CuttingCondition>(
-          names::CUTTING_CONDITION, QUEUE,
-          [this](const smartmill_msgs::CuttingCondition::ConstPtr& condition) {
-            recorder_.handle(fromMsg(*condition));
-          })),
+      servo_(hear<smartmill_msgs::SampleBlock>(nh, names::SERVO_RECORD, recorder_)),
+      condition_(hear<smartmill_msgs::CuttingCondition>(nh, names::CUTTING_CONDITION, recorder_)),
       server_(
           nh, names::IDENTIFY_AXIS_DRIVE, [this](Server::GoalHandle handle) { goal(handle); },
           [this](Server::GoalHandle handle) { cancel(handle); }, false) {

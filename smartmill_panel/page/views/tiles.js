@@ -75,7 +75,7 @@ export class Tiles {
     const { link } = this, gone = !link.alive;
     const stale = gone || link.age('cnc/state') > STALE_AGE, state = link.message('cnc/state');
     const condition = link.message('cut/condition'), cutting = condition?.kind === 2;
-    this.showLamp(gone, cutting);
+    this.showLamp(gone, cutting, condition?.kind === 3);
     const most = link.message('stability/chart')?.spindle_speed.at(-1);
     this.spindle.set(state ? fixed(rpm(state.spindle_speed)) : '–',
       condition?.kind ? `commanded ${fixed(rpm(condition.spindle_speed))}` : most ? `up to ${fixed(rpm(most))}` : '', stale);
@@ -103,12 +103,12 @@ export class Tiles {
     }
   }
 
-  showLamp(gone, cutting) {
+  showLamp(gone, cutting, unsteady) {
     const { link } = this, last = this.verdicts.at(-1), advice = link.message('chatter/advice');
     const old = gone || (cutting && last?.valid && link.age('chatter/state') > VERDICT_STALE_AGE);
     const name = link.message('cut/condition')?.name ?? '';
     if (!last || !last.valid || !cutting) {
-      this.lamp.set(cutting ? 'Entering' : 'No cut', name, old, 'quiet');
+      this.lamp.set(cutting ? 'Entering' : unsteady ? 'Unsteady cut' : 'No cut', name, old, 'quiet');
     } else if (last.chatter) {
       const speed = advice && advice.condition === last.condition ? advice.speeds[0]?.spindle_speed : undefined;
       this.lamp.set('CHATTER', `${fixed(last.frequency)} Hz, ${fixed(last.severity)} N` +

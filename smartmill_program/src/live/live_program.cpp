@@ -82,7 +82,10 @@ class StretchFinder {
     const double begin = at_, end = at_ + step.length;
     at_ = end;
     const bool contact = !step.air();
-    if (contact) addContact(begin, end);
+    if (contact) {
+      addContact(begin, end);
+      geometryOf(step.move->tool);
+    }
     const bool cut = contact && isSteadyCut(step), air = !contact && step.move->spindle_speed > 0.0;
     if (run_ && !(cut && continuesCut(step)) && !(air && continuesAir(*step.move))) close(contact);
     in_contact_ = contact;
@@ -113,6 +116,12 @@ class StretchFinder {
     std::vector<Engagement> banded;  // of each step of a cut with bands; empty: without
   };
   const std::vector<Move>& moves() const { return program_.path.moves(); }
+
+  const ToolGeometry& geometryOf(int tool) {
+    const auto [known, is_new] = program_.tools.try_emplace(tool);
+    if (is_new) known->second = *tools_.of(tool).tool;
+    return known->second;
+  }
 
   /// The dwells after the moves since the last step. A tool at rest is in air if it was before.
   void dwellBefore(std::size_t move) {
@@ -164,7 +173,7 @@ class StretchFinder {
     stretch.begin = begin;
     stretch.move = move;
     stretch.tool = moves()[move].tool;
-    stretch.geometry = *tools_.of(stretch.tool).tool;
+    geometryOf(stretch.tool);
     stretch.spindle_speed = moves()[move].spindle_speed;
     stretch.feed = cut ? moves()[move].feed : 0.0;
     sum_ = {};
@@ -201,7 +210,7 @@ class StretchFinder {
       } else {
         stretch.engagement = run.banded[run.banded.size() / 2];
       }
-      stretch.engagement.feed_per_tooth = stretch.feed * revolution / stretch.geometry.teeth;
+      stretch.engagement.feed_per_tooth = stretch.feed * revolution / geometryOf(stretch.tool).teeth;
       // The engagement is that of the middle of a step.
       const double way = std::max(stretch.feed * margin, run.step_length);
       stretch.steady_from = stretch.begin + way;
@@ -239,9 +248,24 @@ double LiveProgram::contactBetween(double from, double to) const {
   return length;
 }
 
+std::optional<Engagement> LiveProgram::enclosingEngagement(double from, double to) const {
+  auto next = std::upper_bound(pieces.begin(), pieces.end(), from,
+                               [](double place, const PathPiece& piece) { return place < piece.to; });
+  std::optional<Engagement> found;
+  for (; next != pieces.end() && next->from < to; ++next) {
+    if (next->contact.empty()) continue;
+    const Engagement here{next->contact.entry(), next->contact.exit(), next->contact.axialDepth(), 0.0};
+    if (!found) found = here;
+    found->entry = std::min(found->entry, here.entry);
+    found->exit = std::max(found->exit, here.exit);
+    found->axial_depth = std::max(found->axial_depth, here.axial_depth);
+  }
+  return found;
+}
+
 LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, ToolModels& tools, Stock& stock,
                            const SimulationOptions& simulation, const StretchParameters& parameters) {
-  LiveProgram program{name, ProgramPath(std::move(moves)), {}, {}, {}};
+  LiveProgram program{name, ProgramPath(std::move(moves)), {}, {}, {}, {}};
   StretchFinder finder(program, tools, parameters);
   PieceMaker pieces(tools, {parameters.angle_tolerance, parameters.depth_tolerance});
   AnalysisOptions options;

@@ -44,7 +44,7 @@ std::optional<CuttingCondition> PathFollower::handle(const CncState& state) {
     status_.follows = Follows::idle;
     status_.deviation = status_.angle_std = NOT_A_NUMBER;
     last_stamp_ = state.stamp;
-    return end(state.stamp);
+    return between(state);
   }
   track(state, *tip);
   last_tip_ = *tip;
@@ -54,7 +54,7 @@ std::optional<CuttingCondition> PathFollower::handle(const CncState& state) {
   const std::optional<std::size_t> here = stretchHere(state);
   if (here != stretch_) readings_.clear();
   stretch_ = here;
-  if (!here) return end(state.stamp);
+  if (!here) return between(state);
   readings_.push_back({state.stamp, state.feed, state.spindle_speed});
   while (readings_.size() > 2 && readings_[1].stamp <= state.stamp - parameters_.steady_time)
     readings_.pop_front();
@@ -64,10 +64,9 @@ std::optional<CuttingCondition> PathFollower::handle(const CncState& state) {
         (!cut || std::abs(state.feed - active_->feed) <= parameters_.feed_tolerance * active_->feed))
       return std::nullopt;
     readings_.erase(readings_.begin(), readings_.end() - 1);
-    return end(state.stamp);
+    return between(state);
   }
-  if (active_) return end(state.stamp);
-  if (other_source_ || !isSteady()) return std::nullopt;
+  if (active_ || other_source_ || !isSteady()) return between(state);
   return begin(*here, state.stamp);
 }
 
@@ -86,7 +85,9 @@ void PathFollower::restart() {
 
 void PathFollower::setOtherSource(bool other) {
   other_source_ = other;
-  if (other) active_.reset();
+  if (!other) return;
+  active_.reset();
+  unsteady_ = false;
 }
 
 bool PathFollower::runs(const CncState& state) const {
@@ -240,7 +241,7 @@ std::optional<std::size_t> PathFollower::stretchHere(const CncState& state) {
   const SteadyStretch& stretch = *(next - 1);
   const auto index = static_cast<std::size_t>(next - 1 - stretches.begin());
   if (!stretch.cut) {
-    if (at->place > stretch.steady_to + slack_) return std::nullopt;
+    if (at->place > stretch.steady_to + slack_ || status_.material_unknown) return std::nullopt;
     return index;
   }
   status_.cut_before = stretch.begin < cut_until_;
@@ -255,7 +256,8 @@ std::optional<std::size_t> PathFollower::stretchHere(const CncState& state) {
 /// deviation over the radius. The ends 0 and pi are the tool's own.
 double PathFollower::angleStd(const SteadyStretch& stretch, double deviation) const {
   constexpr double OWN_END = 1e-3;  // [rad]
-  const double shift = std::hypot(parameters_.position_std, deviation) / stretch.geometry.radius();
+  const double shift =
+      std::hypot(parameters_.position_std, deviation) / program_->tools.at(stretch.tool).radius();
   double largest = 0.0;
   for (const double angle : {stretch.engagement.entry, stretch.engagement.exit}) {
     if (angle < OWN_END || angle > units::PI - OWN_END) continue;
@@ -288,25 +290,17 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
     active.speed += reading.speed / static_cast<double>(readings_.size());
   }
   active_ = active;
+  unsteady_ = false;
   ++status_.conditions;
-  const int count = ++stated_[index];
 
-  CuttingCondition condition;
-  condition.stamp = stamp;
+  const Move& move = program_->path.moves()[stretch.move];
+  CuttingCondition condition = conditionOf(move, stamp);
   condition.kind = stretch.cut ? CuttingCondition::Kind::cut : CuttingCondition::Kind::air;
-  condition.name = std::filesystem::path(program_->name).filename().string() +
-                   (stretch.cut ? "" : " air from") +
-                   formatted(" line %d", program_->path.moves()[stretch.move].line) +
-                   (stretch.part > 1 ? formatted(" stretch %d", stretch.part) : "") +
-                   (count > 1 ? formatted(" (%d)", count) : "");
-  condition.material = names_.material;
-  condition.tool_name = toolName(names_.tool, stretch.tool, several_tools_);
-  condition.tool = stretch.geometry;
-  condition.cut_time_before = cut_time_[stretch.tool];
+  condition.name = nameOf(stretch.cut ? "" : " air from", move, stretch.part, ++stated_[index]);
   condition.spindle_speed = active.speed;
   if (!stretch.cut) return condition;
   condition.engagement = stretch.engagement;
-  condition.engagement.feed_per_tooth = active.feed * units::TWO_PI / (active.speed * stretch.geometry.teeth);
+  condition.engagement.feed_per_tooth = active.feed * units::TWO_PI / (active.speed * condition.tool.teeth);
   for (std::size_t a = 0; a < 3; ++a) {
     condition.steady_from[a] = stretch.from[a] + zero_[a];
     condition.steady_to[a] = stretch.turns ? NOT_A_NUMBER : stretch.to[a] + zero_[a];
@@ -314,12 +308,68 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
   return condition;
 }
 
-std::optional<CuttingCondition> PathFollower::end(double stamp) {
-  if (!active_) return std::nullopt;
+CuttingCondition PathFollower::conditionOf(const Move& move, double stamp) const {
+  CuttingCondition condition;
+  condition.stamp = stamp;
+  condition.material = names_.material;
+  condition.tool_name = toolName(names_.tool, move.tool, several_tools_);
+  if (const auto tool = program_->tools.find(move.tool); tool != program_->tools.end())
+    condition.tool = tool->second;
+  const auto time = cut_time_.find(move.tool);
+  condition.cut_time_before = time == cut_time_.end() ? 0.0 : time->second;
+  return condition;
+}
+
+std::string PathFollower::nameOf(const char* kind, const Move& move, int part, int count) const {
+  return std::filesystem::path(program_->name).filename().string() + kind + formatted(" line %d", move.line) +
+         (part > 1 ? formatted(" stretch %d", part) : "") + (count > 1 ? formatted(" (%d)", count) : "");
+}
+
+std::optional<CuttingCondition> PathFollower::between(const CncState& state) {
+  const bool in_work = !other_source_ && isInWork(state);
+  if (!active_ && in_work == unsteady_) return std::nullopt;
   active_.reset();
+  unsteady_ = in_work;
+  if (in_work) return unsteady(state);
   CuttingCondition none;
-  none.stamp = stamp;
+  none.stamp = state.stamp;
   return none;
+}
+
+/// Where the place is not known, at any of the possible ones, and until the next states.
+bool PathFollower::isInWork(const CncState& state) const {
+  constexpr double AHEAD = 0.15;         // [s] air ends 0.1 s before the contact
+  constexpr double MOST_OVERRIDE = 2.0;  // a state just after a rapid move has its feed
+  if (status_.follows == Follows::idle || status_.follows == Follows::searching) return false;
+  if (status_.follows == Follows::lost || status_.material_unknown) return true;
+  return std::any_of(hypotheses_.begin(), hypotheses_.end(), [&](const Hypothesis& at) {
+    const Move& move = program_->path.moves()[at.move];
+    const double ahead = move.rapid ? 0.0 : AHEAD * std::min(state.feed, MOST_OVERRIDE * move.feed);
+    return program_->cutsBetween(at.place - slack_, at.place + slack_ + ahead);
+  });
+}
+
+CuttingCondition PathFollower::unsteady(const CncState& state) {
+  const std::vector<Move>& moves = program_->path.moves();
+  const Hypothesis* at = unique();
+  const auto here = std::find_if(moves.begin(), moves.end(),
+                                 [this](const Move& move) { return move.line == status_.line; });
+  const Move& move = at ? moves[at->move] : here == moves.end() ? moves.front() : *here;
+  CuttingCondition condition = conditionOf(move, state.stamp);
+  condition.kind = CuttingCondition::Kind::unsteady;
+  condition.name = nameOf(" unsteady from", move, 1, ++stated_unsteady_[move.line]);
+  condition.spindle_speed = state.spindle_speed;
+  condition.steady_from = condition.steady_to = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  if (!at) return condition;
+  const auto next = std::find_if(program_->stretches.begin(), program_->stretches.end(),
+                                 [at](const SteadyStretch& stretch) { return stretch.begin > at->place; });
+  const double end = next == program_->stretches.end() ? program_->path.length() : next->steady_from;
+  if (const auto engagement = program_->enclosingEngagement(at->place, end)) {
+    condition.engagement = *engagement;
+    const double teeth_per_second = condition.tool.teeth * state.spindle_speed / units::TWO_PI;
+    if (teeth_per_second > 0.0) condition.engagement.feed_per_tooth = state.feed / teeth_per_second;
+  }
+  return condition;
 }
 
 }  // namespace smartmill::program

@@ -55,7 +55,7 @@ TEST(SteadyStretches, AreTheConstantEngagementsOfAShoulder) {
     EXPECT_NEAR(degFromRad(cuts[k].engagement.exit), exit[k], 0.05) << k;
     EXPECT_NEAR(cuts[k].engagement.axial_depth, 2 * MM, 1e-9);
     EXPECT_NEAR(cuts[k].engagement.feed_per_tooth, 0.05 * MM, 1e-9);  // 600 mm/min, 3000 rpm, four teeth
-    EXPECT_EQ(cuts[k].geometry.teeth, 4);
+    EXPECT_EQ(program.tools.at(cuts[k].tool).teeth, 4);
     // Margin: 0.1 s at 10 mm/s.
     EXPECT_NEAR(cuts[k].from[0] / MM, first[k] + way[k], 2.0 * STEP) << k;
     EXPECT_NEAR(cuts[k].from[2] / MM, -2.0, 1e-9);

@@ -142,7 +142,7 @@ TEST(PathFollower, StatesEachCutOfAProgramWhileItIsSteady) {
     for (std::size_t i = 0; i < controller.conditions.size(); ++i) {
       const bool begins = controller.conditions[i].kind == CuttingCondition::Kind::cut;
       const bool ends = i > 0 && controller.conditions[i - 1].kind == CuttingCondition::Kind::cut;
-      EXPECT_TRUE(!ends || controller.conditions[i].kind == CuttingCondition::Kind::none);
+      EXPECT_FALSE(ends && begins) << i;
       if (!begins && !ends) continue;
       EXPECT_GE(controller.places[i][0], 0.0) << i;
       EXPECT_LE(controller.places[i][0], 60.0) << i;
@@ -199,6 +199,35 @@ TEST(PathFollower, AirIsStatedWithTheSpindleTurning) {
   }
 }
 
+// Contact in the slot while the front of the tool is in the stock, x = -5 to 60 mm.
+TEST(PathFollower, WhileTheToolIsInTheWorkItsCutIsSteadyOrUnsteady) {
+  PathFollower follower = followerOf(SHOULDER);
+  Controller controller(follower);
+  int in_work = 0, out_of_it = 0;
+  controller.run({SHOULDER_WAYS.begin(), SHOULDER_WAYS.begin() + 4}, [&](const std::array<double, 3>& at) {
+    const bool stated = !controller.conditions.empty() && controller.conditions.back().isInWork();
+    // A state is 0.2 mm of way; ahead are 0.15 s of it.
+    if (at[1] < 10.1 && at[2] < 0.0 && at[0] > -4.8 && at[0] < 59.8) in_work += stated ? 1 : 1000;
+    if (at[0] < -7.5 || (at[1] > 11.0 && at[1] < 12.5)) out_of_it += stated ? 1000 : 1;
+    return false;
+  });
+  EXPECT_NEAR(in_work, 323, 2);
+  EXPECT_NEAR(out_of_it, 60, 20);
+  // From the entry until the slot is steady, and where it ends.
+  const auto unsteady = controller.ofKind(CuttingCondition::Kind::unsteady);
+  ASSERT_EQ(unsteady.size(), 2u);
+  EXPECT_EQ(unsteady[0].name, "part.nc unsteady from line 4");
+  EXPECT_EQ(unsteady[1].name, "part.nc unsteady from line 4 (2)");
+  for (const CuttingCondition& condition : {unsteady[0], unsteady[1]}) {
+    EXPECT_NEAR(condition.engagement.axial_depth, 2 * MM, 1e-9);
+    EXPECT_NEAR(condition.engagement.feed_per_tooth, 10.0 / (4 * RPS) * MM, 1e-9);
+    EXPECT_NEAR(condition.engagement.exit, PI, 0.01);
+    EXPECT_NEAR(condition.engagement.entry, 0.0, 0.01);
+    EXPECT_EQ(condition.tool.teeth, 4);
+    EXPECT_TRUE(std::isnan(condition.steady_to[0]));
+  }
+}
+
 TEST(PathFollower, AnOverrideEndsTheConditionAndBeginsOneWithTheActualFeed) {
   PathFollower follower = followerOf(SHOULDER);
   Controller controller(follower);
@@ -236,9 +265,9 @@ TEST(PathFollower, AFeedHoldEndsTheConditionUntilTheProgramGoesOn) {
   ASSERT_EQ(cuts.size(), 2u);
   const auto second = std::find_if(controller.conditions.begin(), controller.conditions.end(),
                                    [&](const CuttingCondition& c) { return c.name == cuts[1].name; });
-  const CuttingCondition& none = *(second - 1);
-  EXPECT_EQ(none.kind, CuttingCondition::Kind::none);
-  EXPECT_NEAR(cuts[1].stamp - none.stamp, 200 * PERIOD + 0.1, 2.5 * PERIOD);
+  const CuttingCondition& held = *(second - 1);
+  EXPECT_EQ(held.kind, CuttingCondition::Kind::unsteady);
+  EXPECT_NEAR(cuts[1].stamp - held.stamp, 200 * PERIOD + 0.1, 2.5 * PERIOD);
   EXPECT_EQ(follower.status().parts, 1);
 }
 
@@ -306,7 +335,8 @@ TEST(PathFollower, BesideThePathTheToolIsLostAndFoundAgain) {
   ASSERT_TRUE(follower.states());
   controller.error = {0, 1.0, 0};
   controller.run({{30, {30, 10, -2}, 10}});
-  EXPECT_FALSE(follower.states());
+  EXPECT_EQ(controller.conditions.back().kind, CuttingCondition::Kind::unsteady);  // in the work or not
+  EXPECT_EQ(controller.conditions.back().engagement.axial_depth, 0.0);
   EXPECT_EQ(follower.status().follows, PathFollower::Follows::lost);
   EXPECT_EQ(follower.status().lost, 1u);
   EXPECT_EQ(follower.status().line, 4);
@@ -366,7 +396,7 @@ TEST(PathFollower, ADwellInTheCutIsNoCondition) {
   Controller controller(follower);
   controller.run({{0, {-10, 10, 5}, RAPID}, {0, {-10, 10, -2}, 10}, {0, {30, 10, -2}, 10}});
   for (int i = 0; i < 150; ++i) controller.poll(CncRun::start, 0.0, 0);
-  EXPECT_FALSE(follower.states());
+  EXPECT_EQ(controller.conditions.back().kind, CuttingCondition::Kind::unsteady);
   controller.run({{0, {50, 10, -2}, 10}});
   ASSERT_EQ(controller.cuts().size(), 2u);
   EXPECT_EQ(controller.cuts()[1].name, "part.nc line 6");

@@ -37,7 +37,7 @@ class SteadyRecord {
   const std::optional<CuttingCondition>& condition() const { return condition_; }
   /// Whether this is the present condition: a latched one is received again when a subscriber reconnects.
   bool isPresent(const CuttingCondition& condition) const;
-  bool isTest() const { return condition_ && condition_->kind != CuttingCondition::Kind::none; }
+  bool isTest() const { return condition_ && condition_->isSteady(); }
   bool isCut() const { return condition_ && condition_->kind == CuttingCondition::Kind::cut; }
 
   std::size_t readings() const { return readings_.size(); }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +27,6 @@ struct SteadyStretch {
   std::size_t move = 0;                       ///< first move
   int part = 1;                               ///< number among the stretches of the same line
   int tool = 0;                               ///< T
-  ToolGeometry geometry;                      ///< of the tool
   Engagement engagement;                      ///< of a cut, with the programmed feed
   double feed = 0.0;                          ///< [m/s] of a cut, programmed
   double spindle_speed = 0.0;                 ///< [rad/s] programmed
@@ -62,11 +63,15 @@ struct LiveProgram {
   std::vector<SteadyStretch> stretches;  ///< in ascending order
   std::vector<Interval> contact;         ///< where material is removed, in ascending order
   std::vector<PathPiece> pieces;         ///< in ascending order
+  std::map<int, ToolGeometry> tools;     ///< by T, of the stretches and of all that cut
 
   /// Whether material is removed between two places [m].
   bool cutsBetween(double from, double to) const { return contactBetween(from, to) > 0.0; }
   /// [m] Length of the path between two places [m] on which material is removed.
   double contactBetween(double from, double to) const;
+  /// Of the pieces between two places [m] that cut: least entry, largest exit and depth, without feed; empty:
+  /// none cuts.
+  std::optional<Engagement> enclosingEngagement(double from, double to) const;
 };
 
 /// Runs a program through its stock. @param name of the program, for messages

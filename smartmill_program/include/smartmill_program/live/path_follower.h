@@ -16,7 +16,7 @@
 namespace smartmill::program {
 
 /// Follows the tool along the path of a running program by the controller's states, and states the cutting
-/// condition of every steady stretch that it passes.
+/// condition of every steady stretch that it passes, and between them whether the tool is in the work.
 ///
 /// Each state leaves the places of the path that the tool can have reached; they are hypotheses that the
 /// following states reject until one remains. A place is known after a restart in the middle of the program,
@@ -48,12 +48,12 @@ class PathFollower {
   PathFollower(std::shared_ptr<const LiveProgram> program, const std::array<double, 3>& zero,
                const ConditionNames& names, const FollowerParameters& parameters);
 
-  /// @return the condition that begins; kind none when the present one ends
+  /// @return the condition that begins; kind none when the present one ends out of the work
   std::optional<CuttingCondition> handle(const CncState& state);
   /// While another node states the condition, none begins here, and the present one is theirs to end.
   void setOtherSource(bool other);
   /// Whether a condition of this follower is valid.
-  bool states() const { return active_.has_value(); }
+  bool states() const { return active_.has_value() || unsteady_; }
   const Status& status() const { return status_; }
 
  private:
@@ -91,7 +91,13 @@ class PathFollower {
   double angleStd(const SteadyStretch& stretch, double deviation) const;
   bool isSteady() const;
   CuttingCondition begin(std::size_t index, double stamp);
-  std::optional<CuttingCondition> end(double stamp);
+  /// Outside of a steady stretch. @return the condition, if it is another than before
+  std::optional<CuttingCondition> between(const CncState& state);
+  bool isInWork(const CncState& state) const;
+  CuttingCondition unsteady(const CncState& state);
+  /// The fields of the tool, of a condition that begins at a move.
+  CuttingCondition conditionOf(const Move& move, double stamp) const;
+  std::string nameOf(const char* kind, const Move& move, int part, int count) const;
 
   std::shared_ptr<const LiveProgram> program_;
   std::array<double, 3> zero_;
@@ -110,9 +116,11 @@ class PathFollower {
   std::deque<Reading> readings_;               // in the present stretch
   std::optional<std::size_t> stretch_;
   std::optional<Active> active_;
+  bool unsteady_ = false;  // stated
   bool other_source_ = false;
-  std::map<std::size_t, int> stated_;  // conditions by stretch
-  std::map<int, double> cut_time_;     // [s] in the work, by T
+  std::map<std::size_t, int> stated_;   // conditions by stretch
+  std::map<int, int> stated_unsteady_;  // by line
+  std::map<int, double> cut_time_;      // [s] in the work, by T
   Status status_;
 };
 

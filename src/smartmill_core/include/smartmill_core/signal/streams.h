@@ -80,7 +80,7 @@ struct LoadSample {
 
 /// Present cutting condition (topic cut/condition).
 struct CuttingCondition {
-  enum class Kind : std::uint8_t { none = 0, air = 1, cut = 2 };
+  enum class Kind : std::uint8_t { none = 0, air = 1, cut = 2, unsteady = 3 };
   double stamp = 0.0;  ///< [s] from which it is valid
   Kind kind = Kind::none;
   std::string name;
@@ -92,6 +92,11 @@ struct CuttingCondition {
   double spindle_speed = 0.0;                    ///< [rad/s] commanded
   std::array<double, 3> steady_from{{0, 0, 0}};  ///< [m] tool centre in the machine frame: from here ...
   std::array<double, 3> steady_to{{0, 0, 0}};  ///< [m] ... to here the tool is fully engaged at constant feed
+
+  /// The tool is in the work, or may be.
+  bool isInWork() const { return kind == Kind::cut || kind == Kind::unsteady; }
+  /// Engagement, feed and speed are constant; in air the speed.
+  bool isSteady() const { return kind == Kind::cut || kind == Kind::air; }
 };
 
 /// One block of force on the tool.

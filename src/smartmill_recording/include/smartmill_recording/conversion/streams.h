@@ -163,7 +163,7 @@ void write(const InspectionFeature& f, M& m) {
 
 template <class M>
 void read(const M& m, CuttingCondition& c) {
-  if (m.kind > M::CUT) throw Error("kind: " + std::to_string(m.kind) + " is no condition");
+  if (m.kind > M::UNSTEADY) throw Error("kind: " + std::to_string(m.kind) + " is no condition");
   c.stamp = secondsOf(m.header.stamp);
   c.kind = static_cast<CuttingCondition::Kind>(m.kind);
   c.name = m.name;
