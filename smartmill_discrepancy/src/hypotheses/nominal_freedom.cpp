@@ -138,7 +138,7 @@ std::optional<std::size_t> NominalFreedom::pathShare() const {
 }
 
 bool NominalFreedom::isPathShareSignificant(double share, double std_dev) const {
-  return std::abs(share) >= LIMITS.min_path_deviations * std_dev;
+  return share >= LIMITS.min_path_deviations * std_dev;
 }
 
 void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const {

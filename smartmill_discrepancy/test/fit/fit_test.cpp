@@ -284,6 +284,13 @@ TEST(NominalFreedom, WritesAndRemovesThePathShare) {
   std_devs.back() = 0.3;
   freedom.writeStdDevs(model, std_devs);
   EXPECT_EQ(toothPathOf(model), nullptr);
+  // Away from the true path: no machine does this, scatter does.
+  values.back() = -0.7;
+  model = freedom.apply(nominal, values);
+  std_devs.back() = 0.2;
+  freedom.writeStdDevs(model, std_devs);
+  EXPECT_EQ(toothPathOf(model), nullptr);
+  values.back() = 0.7;
   // A new fit adds to an existing share.
   nominal.effects = {effectEntry("empirical:tooth_path", {{"share", 0.2}})};
   model = NominalFreedom(nominal).apply(nominal, values);

@@ -25,7 +25,7 @@ class NominalFreedom {
   MachineModel apply(const MachineModel& nominal, const std::vector<double>& values) const;
   /// Index of the path share; none without a tool.
   std::optional<std::size_t> pathShare() const;
-  /// Whether a share exceeds its standard deviation enough.
+  /// Whether a share exceeds its standard deviation enough, towards the true path.
   bool isPathShareSignificant(double share, double std_dev) const;
   /// Writes the standard deviations that the file format supports (cutting coefficients, path share) and
   /// removes an insignificant path share.
