@@ -14,7 +14,6 @@ namespace {
 
 using units::degFromRad;
 using units::MM;
-using units::PI;
 
 constexpr double STEP = 0.3125;  // [mm] of a tool of 10 mm
 
