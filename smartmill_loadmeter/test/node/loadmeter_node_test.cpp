@@ -297,6 +297,9 @@ TEST(LoadMeterNode, storesInspectedDimensions) {
   cut.name = "";
   cut.stamp += 10.0;
   player.publish(conditions, toMsg(cut));
+  smartmill_msgs::CuttingCondition unknown = toMsg(cut);
+  unknown.kind = 200;  // refused by one line, and the node goes on
+  player.publish(conditions, unknown);
   player.settle();
   player.end();  // the conditions wait for no stream
   smartmill_msgs::InspectionFeature feature;
