@@ -75,7 +75,6 @@ class GraphTutorialsTest(unittest.TestCase):
 
 
 @unittest.skipUnless(shutil.which("linuxcnc"), "linuxcnc is not installed (./setup --with-linuxcnc)")
-@unittest.skipIf(os.path.realpath(__file__).startswith("/tmp/"), "SmartMill is in /tmp, which LinuxCNC's namespace replaces")
 class LinuxCncTutorialTest(unittest.TestCase):
     def test_linuxcnc(self):
         run_graph_tutorial(self, "linuxcnc")
