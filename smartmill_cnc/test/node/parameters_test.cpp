@@ -9,6 +9,7 @@
 #include "node/tachometer_parameters.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/shipped_parameters.h"
+#include "smartmill_core/testing/temporary_folder.h"
 
 namespace smartmill::cnc {
 namespace {
@@ -16,7 +17,8 @@ namespace {
 const char* const SHIPPED = "../launch/config/cnc.yaml";  // tests run in the package's folder
 
 std::string refusal(const std::string& yaml) {
-  const std::string file = ::testing::TempDir() + "cnc_parameters_test.yaml";
+  const TemporaryFolder temporary;
+  const std::string file = temporary.file("cnc_parameters_test.yaml");
   std::ofstream(file) << yaml;
   std::string message;
   try {

@@ -10,6 +10,7 @@
 #include "smartmill_core/io/uff.h"
 #include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/testing/shared_data.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
 namespace smartmill::hammer {
@@ -124,7 +125,8 @@ TEST(MeasuredFiveHits, GiveOnePoleSet) {
 
 // A hit and an FRF through a universal file, response before force, and acceleration in g; a DynoWare export.
 TEST(TapRecords, ReadUniversalFilesAndDynoWare) {
-  const std::string file = testing::TempDir() + "smartmill_tap.uff";
+  const TemporaryFolder temporary;
+  const std::string file = temporary.file("smartmill_tap.uff");
   UffFunction force, response, frf;
   force.type = response.type = uff::TIME_RESPONSE;
   force.numerator = uff::EXCITATION_FORCE;
@@ -173,7 +175,8 @@ TEST(TapRecords, ReadUniversalFilesAndDynoWare) {
 
 TEST(TapRecords, ErrorsNameTheFault) {
   const auto message = [](const std::string& text, const std::function<void(const std::string&)>& read) {
-    const std::string file = testing::TempDir() + "smartmill_tap.csv";
+    const TemporaryFolder temporary;
+    const std::string file = temporary.file("smartmill_tap.csv");
     std::ofstream(file) << text;
     try {
       read(file);

@@ -32,6 +32,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/eventually.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/parameter_server.h"
@@ -116,7 +117,8 @@ void expectSame(const Blocks& some, const Blocks& all, std::size_t least) {
 
 TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   ASSERT_TRUE(client.waitForServer(ros::Duration(120.0)));
-  const std::string file = testing::TempDir() + "smartmill_kalman_measure_frf_test.bag";
+  const TemporaryFolder temporary;
+  const std::string file = temporary.file("smartmill_kalman_measure_frf_test.bag");
   bag.open(file, rosbag::bagmode::Write);
   collect(names::FORCE_COMPENSATED, live);
   collect("again/force/compensated", again);

@@ -8,6 +8,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
 #include "smartmill_kalman/tuning/tuning_records.h"
@@ -43,7 +44,8 @@ TEST(MemorySchedule, InterpolatesOverTheLogarithmOfTheSpeed) {
 }
 
 TEST(MemorySchedule, IsKeptWithTheCalibration) {
-  const std::string file = testing::TempDir() + "memory_schedule.yaml";
+  const TemporaryFolder temporary;
+  const std::string file = temporary.file("memory_schedule.yaml");
   writeMemorySchedule(exampleSchedule(), file);
   const MemorySchedule read = readMemorySchedule(file);
   ASSERT_EQ(read.axis[2].size(), 3u);

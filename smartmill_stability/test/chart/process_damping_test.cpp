@@ -10,6 +10,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_stability/chart/chart.h"
 #include "smartmill_stability/solvers/model_system.h"
 #include "smartmill_stability_testing/damped_slot.h"
@@ -107,7 +108,8 @@ MachineModel modelOf(const DampedSlot& slot) {
 }
 
 TEST(ProcessDamping, aModelFileWithTheEffectHasItsLimits) {
-  const std::string file = testing::TempDir() + "damped.yaml";
+  const TemporaryFolder temporary;
+  const std::string file = temporary.file("damped.yaml");
   MachineModel model = modelOf(slot(12e3));
   model.spindle.reset();
   writeMachineModel(model, file);
@@ -255,7 +257,8 @@ TEST(ProcessDampingEstimate, refusesCutsThatDoNotBoundIt) {
 }
 
 TEST(ProcessDampingEstimate, readsCutsAndNamesTheWrongLine) {
-  const std::string file = testing::TempDir() + "cuts.csv";
+  const TemporaryFolder temporary;
+  const std::string file = temporary.file("cuts.csv");
   const auto read = [&](const std::string& text) {
     std::ofstream(file) << text;
     return readJudgedCuts(file);

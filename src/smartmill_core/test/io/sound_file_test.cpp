@@ -9,12 +9,14 @@
 #include "smartmill_core/campaign/sound_record.h"
 #include "smartmill_core/cutting/lobe_flanks.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
 
 namespace smartmill {
 namespace {
 
 std::string path(const char* name) {
-  return ::testing::TempDir() + name;
+  static const TemporaryFolder folder;
+  return folder.file(name);
 }
 
 SoundFile tone() {
