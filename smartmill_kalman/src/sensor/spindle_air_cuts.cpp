@@ -61,7 +61,7 @@ SpindleAirCuts::SpindleAirCuts(const SpindleSensorCalibration& calibration, cons
 }
 
 void SpindleAirCuts::reset() {
-  in_work_.reset();
+  out_of_work_ = false;
   air_segment_.reset();
   zero_.reset();
   pending_.clear();
@@ -91,12 +91,12 @@ void SpindleAirCuts::handle(const SpindleAngle& angle) {
 void SpindleAirCuts::handle(const CuttingCondition& condition) {
   addPendingSamples(condition.stamp);
   closeAirSegment();
-  in_work_ = condition.isInWork();
+  out_of_work_ = !condition.isInWork();
 }
 
 void SpindleAirCuts::beginBlock(const SampleBlock& block) {
   addPendingSamples(std::numeric_limits<double>::infinity());
-  learning_ = in_work_ && !*in_work_;
+  learning_ = out_of_work_;
   if (!learning_) return;
   pending_from_ = block.stamp;
   pending_rate_ = block.sample_rate;

@@ -25,9 +25,14 @@ bool isBanded(const Contact& contact) {
   return contact.arcs.size() != 1 || contact.arcs.front().bottom != 0.0;
 }
 
-/// Of a contact with bands, without feed.
+/// Encloses a contact, without feed.
+Engagement enclosing(const Contact& contact) {
+  return {contact.entry(), contact.exit(), contact.axialDepth(), 0.0};
+}
+
+/// The same with its bands.
 Engagement bandedEngagement(const Contact& contact) {
-  Engagement engagement{contact.entry(), contact.exit(), contact.axialDepth(), 0.0};
+  Engagement engagement = enclosing(contact);
   for (const EngagedArc& arc : contact.arcs)
     engagement.bands.push_back({arc.entry, arc.exit, arc.bottom, arc.top});
   return engagement;
@@ -254,7 +259,7 @@ std::optional<Engagement> LiveProgram::enclosingEngagement(double from, double t
   std::optional<Engagement> found;
   for (; next != pieces.end() && next->from < to; ++next) {
     if (next->contact.empty()) continue;
-    const Engagement here{next->contact.entry(), next->contact.exit(), next->contact.axialDepth(), 0.0};
+    const Engagement here = enclosing(next->contact);
     if (!found) found = here;
     found->entry = std::min(found->entry, here.entry);
     found->exit = std::max(found->exit, here.exit);

@@ -19,6 +19,12 @@ constexpr double IMPROBABLE = 25.0;       // difference of chi-square: five stan
 constexpr std::size_t MOST_PLACES = 200;  // of hypotheses; more do not distinguish places
 constexpr double ENTIRE = std::numeric_limits<double>::infinity();
 
+/// [m] @param feed [m/s] @param speed [rad/s] of the spindle; 0: no feed per tooth
+double feedPerTooth(const ToolGeometry& tool, double feed, double speed) {
+  const double passing = speed * tool.teeth;
+  return passing > 0.0 ? feed * units::TWO_PI / passing : 0.0;
+}
+
 }  // namespace
 
 PathFollower::PathFollower(std::shared_ptr<const LiveProgram> program, const std::array<double, 3>& zero,
@@ -79,6 +85,7 @@ void PathFollower::restart() {
   stopped_ = true;
   furthest_ = -1.0;
   cut_until_ = 0.0;
+  move_ = 0;
   cut_time_.clear();
   status_ = {};
 }
@@ -130,6 +137,7 @@ void PathFollower::track(const CncState& state, const Point& tip) {
   }
   if (!at) return;
   furthest_ = std::max(furthest_, at->place);
+  move_ = at->move;
   status_.place = at->place;
   status_.line = program_->path.moves()[at->move].line;
   status_.deviation = at->deviation;
@@ -300,7 +308,7 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
   condition.spindle_speed = active.speed;
   if (!stretch.cut) return condition;
   condition.engagement = stretch.engagement;
-  condition.engagement.feed_per_tooth = active.feed * units::TWO_PI / (active.speed * condition.tool.teeth);
+  condition.engagement.feed_per_tooth = feedPerTooth(condition.tool, active.feed, active.speed);
   for (std::size_t a = 0; a < 3; ++a) {
     condition.steady_from[a] = stretch.from[a] + zero_[a];
     condition.steady_to[a] = stretch.turns ? NOT_A_NUMBER : stretch.to[a] + zero_[a];
@@ -308,15 +316,14 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
   return condition;
 }
 
-CuttingCondition PathFollower::conditionOf(const Move& move, double stamp) const {
+CuttingCondition PathFollower::conditionOf(const Move& move, double stamp) {
   CuttingCondition condition;
   condition.stamp = stamp;
   condition.material = names_.material;
   condition.tool_name = toolName(names_.tool, move.tool, several_tools_);
   if (const auto tool = program_->tools.find(move.tool); tool != program_->tools.end())
     condition.tool = tool->second;
-  const auto time = cut_time_.find(move.tool);
-  condition.cut_time_before = time == cut_time_.end() ? 0.0 : time->second;
+  condition.cut_time_before = cut_time_[move.tool];
   return condition;
 }
 
@@ -350,24 +357,20 @@ bool PathFollower::isInWork(const CncState& state) const {
 }
 
 CuttingCondition PathFollower::unsteady(const CncState& state) {
-  const std::vector<Move>& moves = program_->path.moves();
-  const Hypothesis* at = unique();
-  const auto here = std::find_if(moves.begin(), moves.end(),
-                                 [this](const Move& move) { return move.line == status_.line; });
-  const Move& move = at ? moves[at->move] : here == moves.end() ? moves.front() : *here;
+  const Move& move = program_->path.moves()[move_];
   CuttingCondition condition = conditionOf(move, state.stamp);
   condition.kind = CuttingCondition::Kind::unsteady;
   condition.name = nameOf(" unsteady from", move, 1, ++stated_unsteady_[move.line]);
   condition.spindle_speed = state.spindle_speed;
   condition.steady_from = condition.steady_to = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  const Hypothesis* at = unique();
   if (!at) return condition;
   const auto next = std::find_if(program_->stretches.begin(), program_->stretches.end(),
                                  [at](const SteadyStretch& stretch) { return stretch.begin > at->place; });
   const double end = next == program_->stretches.end() ? program_->path.length() : next->steady_from;
   if (const auto engagement = program_->enclosingEngagement(at->place, end)) {
     condition.engagement = *engagement;
-    const double teeth_per_second = condition.tool.teeth * state.spindle_speed / units::TWO_PI;
-    if (teeth_per_second > 0.0) condition.engagement.feed_per_tooth = state.feed / teeth_per_second;
+    condition.engagement.feed_per_tooth = feedPerTooth(condition.tool, state.feed, state.spindle_speed);
   }
   return condition;
 }

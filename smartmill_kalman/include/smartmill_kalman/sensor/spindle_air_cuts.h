@@ -79,7 +79,7 @@ class SpindleAirCuts {
   SpindleConstants constants_;
   AirCutOptions options_;
   std::array<ModalModel, 3> sensor_;
-  std::optional<bool> in_work_;
+  bool out_of_work_ = false;  // as the condition states
   bool learning_ = false;
   // Samples wait for one block: a condition may arrive that makes them part of a cut.
   std::vector<std::array<double, 6>> pending_;

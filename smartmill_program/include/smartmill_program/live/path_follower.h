@@ -96,7 +96,7 @@ class PathFollower {
   bool isInWork(const CncState& state) const;
   CuttingCondition unsteady(const CncState& state);
   /// The fields of the tool, of a condition that begins at a move.
-  CuttingCondition conditionOf(const Move& move, double stamp) const;
+  CuttingCondition conditionOf(const Move& move, double stamp);
   std::string nameOf(const char* kind, const Move& move, int part, int count) const;
 
   std::shared_ptr<const LiveProgram> program_;
@@ -113,6 +113,7 @@ class PathFollower {
   bool stopped_ = true;                        // since the place was last known
   double furthest_ = -1.0;                     // [m] place that the present part has reached; < 0: none
   double cut_until_ = 0.0;                     // [m] place until which it was cut before a restart
+  std::size_t move_ = 0;                       // of the last known place
   std::deque<Reading> readings_;               // in the present stretch
   std::optional<std::size_t> stretch_;
   std::optional<Active> active_;
