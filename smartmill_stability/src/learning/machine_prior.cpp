@@ -91,7 +91,7 @@ RegenerativeSystem MachinePrior::machine(const std::vector<double>& at) const {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     std::vector<std::array<double, 2>> values;  // frequency, stiffness
     for (std::size_t k = 0; k < modes[axis].size(); ++k) {
-      std::array<double, PER_MODE> z;
+      std::array<double, PER_MODE> z{};
       for (std::size_t i = 0; i < PER_MODE; ++i, ++next) {
         z[i] = at[next];
         if (axis == 1 && alike) {

@@ -32,7 +32,7 @@ constexpr std::size_t SAFE_SHARE = 3;  // what residuals may hide falls with the
 struct PolynomialFit {
   Eigen::VectorXd value;       // a, b, c
   Eigen::MatrixXd covariance;  // for residuals of variance 1
-  double squares;              // of the residuals
+  double squares = 0.0;        // of the residuals
 };
 
 PolynomialFit fitPolynomial(const std::vector<double>& t, const std::vector<double>& k, int degree) {

@@ -36,7 +36,7 @@ class StreamProgress {
  private:
   static constexpr double NEVER = -std::numeric_limits<double>::infinity();
   struct State {
-    double limit;                           // [s]
+    double limit = 0.0;                     // [s]
     double newest = NEVER, silent = 0.0;    // [s] stamp, ticks since it was heard
     double late_since = NEVER, late = 0.0;  // [s] stamp, ticks; NEVER: it is not late
     double behind = 0.0;                    // [s]
