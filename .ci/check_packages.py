@@ -16,7 +16,7 @@ MAY_INCLUDE = {
     "smartmill_focas": set(),
     "smartmill_recording": {"smartmill_core"},
     "smartmill_ros": {"smartmill_core", "smartmill_recording", "smartmill_msgs"},
-    "smartmill_discrepancy": COMMON | {"smartmill_sim"},  # runs the twin
+    "smartmill_discrepancy": COMMON | {"smartmill_sim", "smartmill_program"},  # runs the twin; follows a program in a record
     "smartmill_program": COMMON | {"smartmill_stability"},  # limits of a program's engagements
     "smartmill_studies": None,  # every library
     "smartmill_cli": None,  # the commands of every library

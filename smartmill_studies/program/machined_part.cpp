@@ -44,7 +44,7 @@ std::shared_ptr<const program::LiveProgram> preparedPart(const std::string& text
                                                          const std::vector<std::string>& tools,
                                                          const MachineModel& model) {
   program::ToolModels models(tools);
-  program::Stock stock(program::StockBlock{model.workpiece->low, model.workpiece->high}, 1e-4);
+  program::Stock stock(program::stockBlock(*model.workpiece, {}), 1e-4);
   return std::make_shared<const program::LiveProgram>(
       program::prepareProgram("pocket.nc", program::interpretProgram(text, "pocket.nc"), models, stock,
                               program::SimulationOptions(), program::StretchParameters()));

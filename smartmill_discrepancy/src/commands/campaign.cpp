@@ -4,11 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "recordings/bag_campaign.h"
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/commands.h"
+#include "smartmill_discrepancy/recordings/bag_campaign.h"
+#include "smartmill_discrepancy/recordings/path_campaign.h"
 #include "smartmill_recording/import/import_campaign.h"
+#include "smartmill_recording/recording_file.h"
 
 namespace {
 
@@ -72,11 +74,13 @@ int run(const Arguments& arguments) {
   }
   if (files.empty()) throw UsageError("FILES is required, or a list of files in --import");
   const auto note = [](const std::string& line) { std::printf("%s\n", line.c_str()); };
-  const ImportResult result =
-      importCampaign(plan, files, arguments.out,
-                     [&](const std::string& recording, const std::string& model, const std::string& folder) {
-                       return discrepancy::campaignOfBag(recording, model, folder, note);
-                     });
+  const ImportResult result = importCampaign(
+      plan, files, arguments.out,
+      [&](const std::string& source, const std::string& model, const std::string& folder) {
+        return isRecording(source)
+                   ? discrepancy::campaignOfBag(source, model, folder, note)
+                   : discrepancy::campaignOfPaths(readCampaignWithPaths(source), model, folder, note);
+      });
   for (const std::string& line : result.report) note(line);
   const char* const program = arguments.program.c_str();
   for (const std::string& fault : result.faults) std::fprintf(stderr, "%s: %s\n", program, fault.c_str());
@@ -105,7 +109,8 @@ Command campaignCommand() {
       {"--import import.yaml -o campaign", "the files and statements of import.yaml"},
       {"hit.csv --kind tap --direction x --channels 'acceleration=Ch2[V]*981' -o taps",
        "a hammer test with an accelerometer of 981 m/s2 per volt"},
-      {"session.mcap --model mill.yaml -o campaign", "the steady cuts of a recording"}};
+      {"session.mcap --model mill.yaml -o campaign", "the steady cuts of a recording"},
+      {"production -o campaign", "the steady cuts of a campaign with tests of kind path"}};
   command.files = {{"OUT/campaign.yaml", "the tests"},
                    {"OUT/model.yaml", "the given model, or one with the tool only"},
                    {"import.yaml", "smartmill-import/1: statements about the files (docs/formats.md)"}};

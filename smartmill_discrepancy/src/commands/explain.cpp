@@ -12,10 +12,11 @@
 
 #include <unistd.h>
 
-#include "recordings/bag_campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/inspection_file.h"
 #include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/recordings/bag_campaign.h"
+#include "smartmill_discrepancy/recordings/path_campaign.h"
 #include "smartmill_discrepancy/report/report_html.h"
 #include "smartmill_discrepancy/report/report_json.h"
 #include "smartmill_discrepancy/report/summary.h"
@@ -47,12 +48,19 @@ struct Arguments {
 };
 
 Campaign load(const Arguments& arguments, const std::function<void(const std::string&)>& progress) {
-  if (!isRecording(arguments.campaign)) return readCampaign(arguments.campaign);
-  if (arguments.model.empty())
-    throw Error(arguments.campaign + ": a bag contains no model; state one with --model");
+  const std::string folder = arguments.out + "/campaign";
   std::error_code failed;
-  std::filesystem::remove_all(arguments.out + "/campaign", failed);
-  return campaignOfBag(arguments.campaign, arguments.model, arguments.out + "/campaign", progress);
+  if (isRecording(arguments.campaign)) {
+    if (arguments.model.empty())
+      throw Error(arguments.campaign + ": a bag contains no model; state one with --model");
+    std::filesystem::remove_all(folder, failed);
+    return campaignOfBag(arguments.campaign, arguments.model, folder, progress);
+  }
+  const Campaign campaign = readCampaignWithPaths(arguments.campaign);
+  if (!hasPaths(campaign)) return campaign;
+  std::filesystem::remove_all(folder, failed);
+  return campaignOfPaths(campaign, arguments.model.empty() ? campaign.modelPath() : arguments.model, folder,
+                         progress);
 }
 
 // @return exit status

@@ -1,4 +1,4 @@
-#include "recordings/bag_campaign.h"
+#include "smartmill_discrepancy/recordings/bag_campaign.h"
 
 #include "node/monitor_parameters.h"
 #include "node/wiring.h"

@@ -268,6 +268,15 @@ std::optional<Engagement> LiveProgram::enclosingEngagement(double from, double t
   return found;
 }
 
+StockBlock stockBlock(const Workpiece& workpiece, const std::array<double, 3>& zero) {
+  StockBlock block;
+  for (std::size_t a = 0; a < zero.size(); ++a) {
+    block.low[a] = workpiece.low[a] - zero[a];
+    block.high[a] = workpiece.high[a] - zero[a];
+  }
+  return block;
+}
+
 LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, ToolModels& tools, Stock& stock,
                            const SimulationOptions& simulation, const StretchParameters& parameters) {
   LiveProgram program{name, ProgramPath(std::move(moves)), {}, {}, {}, {}};

@@ -49,16 +49,11 @@ StockShape stockOf(const NodeParameters& parameters, const ToolModels& models) {
     return StockShape::mesh(std::make_shared<TriangleMesh>(readStl(parameters.stock_file, units::MM)));
   const std::array<double, 3>& size = parameters.stock_size;
   const bool own = std::any_of(size.begin(), size.end(), [](double s) { return s > 0.0; });
+  if (!own) return stockBlock(workpieceOf(models, "stock_size"), parameters.program_zero);
   StockBlock block;
   for (std::size_t a = 0; a < 3; ++a) {
-    if (own) {
-      block.low[a] = parameters.stock_corner[a];
-      block.high[a] = block.low[a] + size[a];
-    } else {
-      const Workpiece& workpiece = workpieceOf(models, "stock_size");
-      block.low[a] = workpiece.low[a] - parameters.program_zero[a];
-      block.high[a] = workpiece.high[a] - parameters.program_zero[a];
-    }
+    block.low[a] = parameters.stock_corner[a];
+    block.high[a] = block.low[a] + size[a];
   }
   return block;
 }

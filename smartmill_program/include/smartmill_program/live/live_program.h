@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/cutting/tool.h"
+#include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/engagement/cut_simulation.h"
@@ -73,6 +75,10 @@ struct LiveProgram {
   /// none cuts.
   std::optional<Engagement> enclosingEngagement(double from, double to) const;
 };
+
+/// The workpiece of a model in the coordinates of a program. @param zero [m] machine position at which the
+/// tip of the tool is at the program's zero
+StockBlock stockBlock(const Workpiece& workpiece, const std::array<double, 3>& zero);
 
 /// Runs a program through its stock. @param name of the program, for messages
 /// @throws Error as ProgramAnalysis::run, and on a rapid move that meets the stock

@@ -26,7 +26,8 @@ constexpr const char* FORMAT = "smartmill-campaign/1";
 const Range POSITIVE = Range::positive();
 const Range NOT_NEGATIVE = Range::notNegative();
 const Range TURN_DEG{0.0, 360.0, false, false};
-constexpr std::array<TestKind, 4> KINDS{{TestKind::cut, TestKind::air, TestKind::tap, TestKind::move}};
+constexpr std::array<TestKind, 5> KINDS{
+    {TestKind::cut, TestKind::air, TestKind::tap, TestKind::move, TestKind::path}};
 
 bool insideFolder(const std::string& file) {
   const fs::path path(file);
@@ -70,11 +71,30 @@ PulseTachometerParameters readTachometer(const StrictYaml& map) {
   return tachometer;
 }
 
+PathProgram readPathProgram(const StrictYaml& map) {
+  PathProgram program;
+  program.file = fileInside(map, "program");
+  if (map.has("program_zero_mm")) {
+    const std::vector<double> zero = map.numbers("program_zero_mm", program.zero.size());
+    for (std::size_t a = 0; a < zero.size(); ++a) program.zero[a] = zero[a] * units::MM;
+  }
+  const auto tools = map.optionalMap("tools");
+  if (!tools) return program;
+  for (const std::string& key : tools->keys()) {
+    const bool digits = key.size() <= 8 && key.find_first_not_of("0123456789") == std::string::npos;
+    const int number = digits ? std::stoi(key) : 0;
+    if (number < 1) tools->fail(key, "is not a tool number (expected 1 to 99999999)");
+    program.tools[number] = fileInside(*tools, key);
+  }
+  tools->finish();
+  return program;
+}
+
 CampaignTest readTest(const StrictYaml& map) {
   CampaignTest test;
   test.name = map.word("name");
   test.kind = readKind(map);
-  test.file = fileInside(map);
+  test.file = fileInside(map, "file");
   test.sample_rate = map.number("sample_rate_hz", POSITIVE);
   if (map.has("file_format")) {
     test.file_format = map.oneOf("file_format", {"dynoware", "sound"});
@@ -92,6 +112,7 @@ CampaignTest readTest(const StrictYaml& map) {
   test.spindle_speed =
       units::radPerSecFromRpm(turns ? map.number("spindle_speed_rpm", POSITIVE)
                                     : map.optionalNumber("spindle_speed_rpm", NOT_NEGATIVE).value_or(0.0));
+  if (test.kind == TestKind::path) test.program = readPathProgram(map);
   if (test.kind == TestKind::tap)
     test.direction = map.oneOf("direction", {AXIS_NAMES.begin(), AXIS_NAMES.end()});
   if (test.kind == TestKind::cut) {
@@ -123,6 +144,14 @@ CampaignTest readTest(const StrictYaml& map) {
   return test;
 }
 
+void write(const PathProgram& program, std::ostream& out) {
+  out << "  program: " << yamlWord(program.file) << "\n  program_zero_mm: [";
+  for (std::size_t a = 0; a < program.zero.size(); ++a)
+    out << (a > 0 ? ", " : "") << yamlNumber(program.zero[a] / units::MM);
+  out << "]\n" << (program.tools.empty() ? "" : "  tools:\n");
+  for (const auto& [number, file] : program.tools) out << "    " << number << ": " << yamlWord(file) << "\n";
+}
+
 }  // namespace
 
 const char* testKindName(TestKind kind) {
@@ -134,26 +163,49 @@ const char* testKindName(TestKind kind) {
     case TestKind::tap:
       return "tap";
     case TestKind::move:
+      return "move";
+    case TestKind::path:
       break;
   }
-  return "move";
+  return "path";
 }
 
-std::string fileInside(const StrictYaml& map) {
-  const std::string file = map.word("file");
-  if (!insideFolder(file)) map.fail("file", "'" + file + "' lies outside the campaign's folder");
+std::string fileInside(const StrictYaml& map, const std::string& key) {
+  const std::string file = map.word(key);
+  if (!insideFolder(file)) map.fail(key, "'" + file + "' lies outside the campaign's folder");
   return file;
 }
 
+std::string Campaign::inFolder(const std::string& file) const {
+  return (fs::path(folder) / file).string();
+}
+
 std::string Campaign::pathOf(const CampaignTest& test) const {
-  return (fs::path(folder) / test.file).string();
+  return inFolder(test.file);
 }
 
 std::string Campaign::modelPath() const {
-  return (fs::path(folder) / model_file).string();
+  return inFolder(model_file);
+}
+
+bool hasPaths(const Campaign& campaign) {
+  return std::any_of(campaign.tests.begin(), campaign.tests.end(),
+                     [](const CampaignTest& test) { return test.kind == TestKind::path; });
 }
 
 Campaign readCampaign(const std::string& path) {
+  const Campaign campaign = readCampaignWithPaths(path);
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind == TestKind::path)
+      throw Error(
+          path + ": test " + test.name +
+          " is of kind path, expected cut, air, tap or move; `smartmill campaign` makes a campaign of "
+          "its steady cuts");
+  }
+  return campaign;
+}
+
+Campaign readCampaignWithPaths(const std::string& path) {
   const fs::path file = fs::is_directory(path) ? fs::path(path) / "campaign.yaml" : fs::path(path);
   const StrictYaml root = StrictYaml::fromFile(file.string());
   Campaign campaign;
@@ -201,6 +253,7 @@ void writeCampaign(const Campaign& campaign, const std::string& folder) {
     if (test.start_time) number("start_time_s", *test.start_time);
     if (test.cut_time_before) number("cut_time_before_s", *test.cut_time_before);
     if (!test.direction.empty()) out << "  direction: " << test.direction << "\n";
+    if (test.program) write(*test.program, out);
     if (!test.stream_offset.empty()) out << "  stream_offset_s:\n";
     for (const auto& [group, offset] : test.stream_offset)
       out << "    " << group << ": " << yamlNumber(offset) << "\n";

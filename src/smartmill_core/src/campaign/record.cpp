@@ -290,6 +290,9 @@ Record readColumns(const Campaign& campaign, const CampaignTest& test) {
     Record record = readCsvAt(path, test.sample_rate);
     if (test.kind == TestKind::move && std::none_of(record.names.begin(), record.names.end(), motionAxis))
       throw Error(path + ": a move needs a column axis_x[mm], axis_vx[mm/min] or those of y or z");
+    if (test.kind == TestKind::path) {
+      for (const char* position : {"axis_x", "axis_y", "axis_z"}) record.column(position);
+    }
     return record;
   }
   std::string channels;

@@ -17,7 +17,7 @@ SlowChannel readOne(const StrictYaml& map, const std::vector<CampaignTest>& test
   SlowChannel slow;
   slow.test = map.word("test");
   slow.channel = map.oneOf("channel", {"load_meter"});
-  slow.file = fileInside(map);
+  slow.file = fileInside(map, "file");
   slow.sample_rate = map.number("sample_rate_hz", Range::positive());
   map.finish();
   const auto test =

@@ -176,7 +176,7 @@ TEST(Campaign, errorsNameFileKeyAndValue) {
        "tests[0].file: '../slot.csv' lies outside the campaign's folder"},
       {"file: slot.csv", "file: /slot.csv", "tests[0].file: '/slot.csv' lies outside the campaign's folder"},
       {"name: air", "name: slot", "tests[1].name: 'slot' is the name of two tests"},
-      {"kind: air", "kind: ari", "tests[1].kind: 'ari' is not one of cut | air | tap | move"},
+      {"kind: air", "kind: ari", "tests[1].kind: 'ari' is not one of cut | air | tap | move | path"},
       {"spindle_speed_rpm: 1000", "spindle_speed_rpm: 0",
        "tests[1].spindle_speed_rpm: 0 is out of range (> 0)"},
       {"exit_deg: 180.0", "exit_deg: 0", "tests[0].exit_deg: 0.0 is out of range (> entry_deg 0.0)"},
@@ -193,6 +193,55 @@ TEST(Campaign, errorsNameFileKeyAndValue) {
       {"tests:", "runs:", "tests: is missing"},
   };
   expectRefusals(CAMPAIGN, refusals, readCampaign);
+}
+
+constexpr const char* PATHS = R"(format: smartmill-campaign/1
+model: model.yaml
+tests:
+- {name: part, kind: path, file: part.csv, sample_rate_hz: 100, program: pocket.nc, start_time_s: 7,
+   program_zero_mm: [10, -20, 5.5], tools: {2: drill.yaml, 1: model.yaml}}
+- {name: second, kind: path, file: second.csv, sample_rate_hz: 100, program: other.nc}
+)";
+
+TEST(Campaign, readsAndWritesPaths) {
+  const TemporaryFolder folder;
+  folder.write("campaign.yaml", PATHS);
+  const auto expectPaths = [](const Campaign& campaign) {
+    ASSERT_EQ(campaign.tests.size(), 2u);
+    EXPECT_TRUE(hasPaths(campaign));
+    EXPECT_EQ(campaign.tests[0].kind, TestKind::path);
+    EXPECT_EQ(campaign.tests[0].start_time, 7.0);
+    const PathProgram& program = campaign.tests[0].program.value();
+    EXPECT_EQ(program.file, "pocket.nc");
+    EXPECT_DOUBLE_EQ(program.zero[0], 0.01);
+    EXPECT_DOUBLE_EQ(program.zero[1], -0.02);
+    EXPECT_DOUBLE_EQ(program.zero[2], 5.5e-3);
+    EXPECT_EQ(program.tools, (std::map<int, std::string>{{1, "model.yaml"}, {2, "drill.yaml"}}));
+    EXPECT_TRUE(campaign.tests[1].program.value().tools.empty());
+  };
+  const Campaign campaign = readCampaignWithPaths(folder.file("."));
+  expectPaths(campaign);
+  writeCampaign(campaign, folder.file("copy"));
+  expectPaths(readCampaignWithPaths(folder.file("copy")));
+  expectRefusals(
+      PATHS,
+      {{", program: other.nc", "", "tests[1].program: is missing"},
+       {"other.nc", "../other.nc", "tests[1].program: '../other.nc' lies outside the campaign's folder"},
+       {"2: drill", "two: drill", "tests[0].tools.two: is not a tool number (expected 1 to 99999999)"},
+       {"2: drill", "0: drill", "tests[0].tools.0: is not a tool number (expected 1 to 99999999)"},
+       {"2: drill", "999999999: drill",
+        "tests[0].tools.999999999: is not a tool number (expected 1 to 99999999)"},
+       {"[10, -20, 5.5]", "[10, -20]", "tests[0].program_zero_mm: a list of 2, expected 3 numbers"},
+       {"kind: path, file: second.csv", "kind: move, file: second.csv",
+        "tests[1].program: unknown key (its value: 'other.nc')"}},
+      readCampaignWithPaths);
+
+  // A reader of cuts names the test and what to do.
+  EXPECT_THAT(errorOf([&] { readCampaign(folder.file(".")); }),
+              HasSubstr("test part is of kind path, expected cut, air, tap or move; `smartmill campaign`"));
+  folder.write("part.csv", "time[s],axis_x[mm],axis_z[mm]\n0,1,2\n0.01,2,2\n");
+  EXPECT_THAT(errorOf([&] { readRecord(campaign, campaign.tests[0]); }),
+              HasSubstr("part.csv: column axis_y is missing"));
 }
 
 constexpr const char* MOVES = R"(format: smartmill-campaign/1

@@ -207,7 +207,7 @@ std::vector<ExportedStream> streamsOfRecording(const std::string& file, const Ex
 }
 
 std::vector<ExportedStream> streamsOfCampaign(const std::string& folder, const ExportSelection& selection) {
-  const Campaign campaign = readCampaign(folder);
+  const Campaign campaign = readCampaignWithPaths(folder);
   std::set<std::string> present;
   for (const CampaignTest& test : campaign.tests) present.insert(test.name);
   checkSelected(folder, selection, present, "test");

@@ -98,9 +98,19 @@ class Importer {
     try {
       const FileKind kind = fileKind(file);
       if (kind == FileKind::campaign) {
-        takeCampaign(readCampaign(file), file);
+        const Campaign campaign = readCampaignWithPaths(file);
+        if (!hasPaths(campaign)) {
+          takeCampaign(campaign, file);
+        } else {
+          if (model_of_campaign_.empty()) model_of_campaign_ = campaign.modelPath();
+          takeSteadyCuts(file, plan_.model.empty() ? campaign.modelPath() : plan_.model);
+        }
       } else if (kind == FileKind::bag || kind == FileKind::mcap) {
-        takeRecording(file);
+        if (plan_.model.empty())
+          throw Error(file +
+                      ": a recording needs the machine model that it was made with (--model, or model in "
+                      "import.yaml)");
+        takeSteadyCuts(file, plan_.model);
       } else {
         takeChannels(file);
       }
@@ -150,15 +160,11 @@ class Importer {
     }
   }
 
-  void takeRecording(const std::string& file) {
+  void takeSteadyCuts(const std::string& file, const std::string& model) {
     if (!recordings_)
       throw Error(file + ": recordings are not read here; expected files of channels or campaigns");
-    if (plan_.model.empty())
-      throw Error(
-          file +
-          ": a recording needs the machine model that it was made with (--model, or model in import.yaml)");
     const NewFolder recorded(folder_.file("recording"));
-    takeCampaign(recordings_(file, plan_.model, recorded.path()), file);
+    takeCampaign(recordings_(file, model, recorded.path()), file);
   }
 
   void add(CampaignTest test, const Record& record, const std::string& file) {

@@ -18,8 +18,8 @@ struct SlowChannel {
   double sample_rate = 0.0;  ///< [Hz]
 };
 
-/// The key `file` of a map. @throws Error on a file outside the campaign's folder.
-std::string fileInside(const StrictYaml& map);
+/// The file that a key of a map names. @throws Error on a file outside the campaign's folder.
+std::string fileInside(const StrictYaml& map, const std::string& key);
 
 /// The slow channels that campaign.yaml lists. @param tests of the campaign. @throws Error as readCampaign().
 std::vector<SlowChannel> readSlowChannels(const StrictYaml& root, const std::vector<CampaignTest>& tests);
