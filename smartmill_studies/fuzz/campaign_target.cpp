@@ -6,7 +6,7 @@ namespace smartmill::fuzz {
 
 void campaign(const std::uint8_t* data, std::size_t size) {
   const std::string& file = inputFile(data, size);
-  readOrRefuse([&] { readCampaign(file); });
+  readOrRefuse([&] { readCampaignWithPaths(file); });
 }
 
 }  // namespace smartmill::fuzz

@@ -16,11 +16,13 @@
 #include "smartmill_core/campaign/stream_offset.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/signal/derivative.h"
 #include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/live/segment_campaign.h"
 #include "smartmill_program/live/path_follower.h"
+#include "smartmill_program/nc/linuxcnc_program.h"
 #include "smartmill_program/nc/program_reader.h"
 
 namespace smartmill::discrepancy {
@@ -42,7 +44,9 @@ std::shared_ptr<const program::LiveProgram> programOf(const Campaign& campaign, 
   program::ReaderOptions reader;
   reader.tool_radius = [&tools](int tool) { return tools.radius(tool); };
   const std::string name = campaign.inFolder(test.program->file);
-  std::vector<program::Move> moves = program::readProgram(name, reader);
+  std::vector<program::Move> moves = test.program->linuxcnc
+                                         ? program::interpretWithLinuxcnc(readText(name), name, reader)
+                                         : program::readProgram(name, reader);
   for (const program::Move& move : moves) tools.of(move.tool);
   const Workpiece workpiece = readMachineModel(model_file).needWorkpiece("follow the program of a path");
   program::Stock stock(program::stockBlock(workpiece, test.program->zero), RESOLUTION);

@@ -74,6 +74,7 @@ PulseTachometerParameters readTachometer(const StrictYaml& map) {
 PathProgram readPathProgram(const StrictYaml& map) {
   PathProgram program;
   program.file = fileInside(map, "program");
+  program.linuxcnc = map.has("dialect") && map.oneOf("dialect", {"fanuc", "linuxcnc"}) == "linuxcnc";
   if (map.has("program_zero_mm")) {
     const std::vector<double> zero = map.numbers("program_zero_mm", program.zero.size());
     for (std::size_t a = 0; a < zero.size(); ++a) program.zero[a] = zero[a] * units::MM;
@@ -145,7 +146,9 @@ CampaignTest readTest(const StrictYaml& map) {
 }
 
 void write(const PathProgram& program, std::ostream& out) {
-  out << "  program: " << yamlWord(program.file) << "\n  program_zero_mm: [";
+  out << "  program: " << yamlWord(program.file) << "\n";
+  if (program.linuxcnc) out << "  dialect: linuxcnc\n";
+  out << "  program_zero_mm: [";
   for (std::size_t a = 0; a < program.zero.size(); ++a)
     out << (a > 0 ? ", " : "") << yamlNumber(program.zero[a] / units::MM);
   out << "]\n" << (program.tools.empty() ? "" : "  tools:\n");

@@ -200,7 +200,7 @@ model: model.yaml
 tests:
 - {name: part, kind: path, file: part.csv, sample_rate_hz: 100, program: pocket.nc, start_time_s: 7,
    program_zero_mm: [10, -20, 5.5], tools: {2: drill.yaml, 1: model.yaml}}
-- {name: second, kind: path, file: second.csv, sample_rate_hz: 100, program: other.nc}
+- {name: second, kind: path, file: second.csv, sample_rate_hz: 100, program: other.nc, dialect: linuxcnc}
 )";
 
 TEST(Campaign, readsAndWritesPaths) {
@@ -217,7 +217,9 @@ TEST(Campaign, readsAndWritesPaths) {
     EXPECT_DOUBLE_EQ(program.zero[1], -0.02);
     EXPECT_DOUBLE_EQ(program.zero[2], 5.5e-3);
     EXPECT_EQ(program.tools, (std::map<int, std::string>{{1, "model.yaml"}, {2, "drill.yaml"}}));
+    EXPECT_FALSE(program.linuxcnc);
     EXPECT_TRUE(campaign.tests[1].program.value().tools.empty());
+    EXPECT_TRUE(campaign.tests[1].program.value().linuxcnc);
   };
   const Campaign campaign = readCampaignWithPaths(folder.file("."));
   expectPaths(campaign);
@@ -226,6 +228,7 @@ TEST(Campaign, readsAndWritesPaths) {
   expectRefusals(
       PATHS,
       {{", program: other.nc", "", "tests[1].program: is missing"},
+       {"dialect: linuxcnc", "dialect: okuma", "tests[1].dialect: 'okuma' is not one of fanuc | linuxcnc"},
        {"other.nc", "../other.nc", "tests[1].program: '../other.nc' lies outside the campaign's folder"},
        {"2: drill", "two: drill", "tests[0].tools.two: is not a tool number (expected 1 to 99999999)"},
        {"2: drill", "0: drill", "tests[0].tools.0: is not a tool number (expected 1 to 99999999)"},

@@ -20,6 +20,7 @@ const char* testKindName(TestKind kind);
 /// The NC program that a test of kind path runs, in the stock of the model's workpiece.
 struct PathProgram {
   std::string file;                  ///< relative to the campaign's folder
+  bool linuxcnc = false;             ///< its dialect is LinuxCNC's, else Fanuc's
   std::array<double, 3> zero{};      ///< [m] machine position at which the tip of the tool is at its zero
   std::map<int, std::string> tools;  ///< model files, relative to the folder, by tool number (T); empty: the
                                      ///< campaign's model describes the only tool
