@@ -43,7 +43,7 @@ CommandProgram smartmillProgram() {
         stability::processDampingCommand(), stability::detectCommand(), stability::nextSpeedCommand(),
         stability::lobesFromCutsCommand()}},
       {"NC programs", {smartmill::program::programCommand()}},
-      {"Controller", {sim::controllerCommand(), cnc::captureCommand()}},
+      {"Controller", {sim::controllerCommand(), cnc::captureCommand(), cnc::fetchProgramCommand()}},
   };
   const CommandProgram shown = program;
   program.hidden = {completionCommand(shown), manualCommand(shown)};

@@ -171,6 +171,7 @@ TEST(Tools, DoWhatTheirCommandsDoWithASpindleSensor) {
 
 TEST(Tools, DoWhatTheirCommandsDoWithAController) {
   expectSame("capture", "127.0.0.1 --port 1 --timeout 0.2", 1);
+  expectSame("fetch-program", "127.0.0.1 --port 1 --timeout 0.2 -o part.nc", 1);
   // Until Ctrl-C. Each run has a port of its own.
   const auto controller = [](const std::string& program) {
     return shell("set -m; timeout -s KILL 60 " + program +

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <map>
@@ -177,6 +178,34 @@ TEST(ClientBytes, DocumentedRequestsAndReplies) {
     EXPECT_EQ(stream[4], show(hex("a0a0a0a0 0001 1c04 0008 0000 8000 0000 0000")));
     EXPECT_EQ(stream[5], show(hex("a0a0a0a0 0001 0201 0000")));
     EXPECT_EQ(stream[6], stream[5]);
+  }
+}
+
+TEST(ClientBytes, UploadAsDocumented) {
+  for (const bool piecewise : {false, true}) {
+    ScriptedServer server({{"a0a0a0a0 0001 1501 0204 00000001 \"O0012-O0012\" Z501",
+                            "a0a0a0a0 0003 1502 0000 a0a0a0a0 0003 1604 0007 25 0a \"O0012\" a0a0a0a0 0003 "
+                            "1604 0006 0a \"M30\" 0a "
+                            "25 a0a0a0a0 0003 1701 0000"},
+                           {"a0a0a0a0 0001 1501 0204 00000001 \"O0013-O0013\" Z501",
+                            "a0a0a0a0 0003 1503 0008 0000 0005 0000 0000"}},
+                          piecewise);
+    Client client;
+    client.connect("127.0.0.1", server.port(), TIMEOUT);
+    EXPECT_EQ(client.upload(12), "%\nO0012\nM30\n%");
+    try {
+      client.upload(13);
+      ADD_FAILURE();
+    } catch (const FocasError& e) {
+      EXPECT_STREQ(e.what(), "upload of O13: EW_DATA (5), detail 0");
+    }
+    EXPECT_EQ(client.upload(12), "%\nO0012\nM30\n%");
+    // The end is confirmed.
+    const std::string confirmed = show(hex("a0a0a0a0 0001 1702 0000"));
+    EXPECT_TRUE(eventually([&] {
+      const std::vector<std::string> requests = server.requests();
+      return std::count(requests.begin(), requests.end(), confirmed) == 2;
+    }));
   }
 }
 
@@ -383,6 +412,29 @@ TEST_F(ClientServerTest, DncWithBackPressureLosesNothing) {
   EXPECT_FALSE(client_.dncOpen());
   EXPECT_EQ(controller_.locked(controller_.text), text);
   EXPECT_EQ(controller_.locked(controller_.ends), 1);
+}
+
+TEST_F(ClientServerTest, UploadCanBeCancelled) {
+  const std::string text = "%\nO1234\n" + std::string(3000, 'X') + "\n%\n";
+  std::size_t size = 0;
+  EXPECT_EQ(client_.upload(1234,
+                           [&](std::size_t so_far) {
+                             size = so_far;
+                             return true;
+                           }),
+            text);
+  EXPECT_EQ(size, text.size());
+  EXPECT_EQ(client_.upload(1234, [](std::size_t) { return false; }), "");
+  EXPECT_EQ(client_.upload(1234), text);
+  EXPECT_THROW(client_.upload(0), FocasError);
+  client_.dncStart();
+  try {
+    client_.upload(1234);
+    ADD_FAILURE();
+  } catch (const FocasError& e) {
+    EXPECT_EQ(e.code(), EW_BUSY);
+  }
+  EXPECT_TRUE(client_.dncOpen());
 }
 
 TEST_F(ClientServerTest, StartRefusals) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -103,6 +104,9 @@ class Client {
   void programNumber(int* running, int* main_program);
   int sequenceNumber();
   std::string executingBlock();
+  /// Text of a program in the memory (upload). @param number O @param progress receives the bytes read so
+  /// far; where it returns false the upload ends and the result is empty
+  std::string upload(int number, const std::function<bool(std::size_t)>& progress = {});
   void reset();       ///< opcode 02
   void cycleStart();  ///< opcode 01
 
