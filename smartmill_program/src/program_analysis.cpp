@@ -32,7 +32,7 @@ ProgramAnalysis::ProgramAnalysis(const std::string& name, ToolModels& models, St
 AnalysisResult ProgramAnalysis::run(const std::vector<Move>& moves, const Visit& visit,
                                     const Progress& progress) {
   AnalysisResult result;
-  StepPredictor predictor(models_, options_.stability);
+  StepPredictor predictor(models_, options_.stability, options_.probability);
   CutSimulation simulation(
       stock_, [&](int tool) -> const ToolShape& { return models_.shape(tool); }, options_.simulation);
   std::size_t done = 0;

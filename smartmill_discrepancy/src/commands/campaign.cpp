@@ -99,9 +99,11 @@ Command campaignCommand() {
   Command command("campaign", "converts measurement files and recordings into a campaign");
   command.description =
       "Converts measurement files (MATLAB, HDF5, CSV and other text, DynoWare, WAV, FLAC, UFF58), recordings "
-      "(bag, MCAP) and campaigns into one campaign: campaign.yaml, model.yaml and one CSV per test. Missing "
-      "or "
-      "wrong statements are reported one per line; then nothing is written.";
+      "(bag, MCAP) and campaigns into one campaign: campaign.yaml, model.yaml and one CSV per test. "
+      "Recordings "
+      "and tests of kind path are replaced by their steady cuts. Missing or wrong statements are reported "
+      "one "
+      "per line; then nothing is written.";
   command.examples = {
       {"cut.mat --kind cut --speed-rpm 4500 --feed-per-tooth-mm 0.06 --axial-depth-mm 2 --entry-deg 0 "
        "--exit-deg 180 --teeth 4 --diameter-mm 19.05 --helix-deg 30 -o campaign",
@@ -109,8 +111,7 @@ Command campaignCommand() {
       {"--import import.yaml -o campaign", "the files and statements of import.yaml"},
       {"hit.csv --kind tap --direction x --channels 'acceleration=Ch2[V]*981' -o taps",
        "a hammer test with an accelerometer of 981 m/s2 per volt"},
-      {"session.mcap --model mill.yaml -o campaign", "the steady cuts of a recording"},
-      {"production -o campaign", "the steady cuts of a campaign with tests of kind path"}};
+      {"session.mcap --model mill.yaml -o campaign", "the steady cuts of a recording"}};
   command.files = {{"OUT/campaign.yaml", "the tests"},
                    {"OUT/model.yaml", "the given model, or one with the tool only"},
                    {"import.yaml", "smartmill-import/1: statements about the files (docs/formats.md)"}};

@@ -14,8 +14,9 @@ namespace smartmill::program {
 
 struct AnalysisOptions {
   SimulationOptions simulation;
-  bool prediction = true;  ///< forces and limits; requires coefficients in the models
-  bool stability = true;   ///< computes stability limits for models with modes of the tool tip
+  bool prediction = true;    ///< forces and limits; requires coefficients in the models
+  bool stability = true;     ///< computes stability limits for models with modes of the tool tip
+  bool probability = false;  ///< computes probabilities of chatter next to the limits
 };
 
 struct AnalysisResult {

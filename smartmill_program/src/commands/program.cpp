@@ -19,6 +19,7 @@
 #include "smartmill_program/nc/program_reader.h"
 #include "smartmill_program/plan/feed_planner.h"
 #include "smartmill_program/plan/plan_report.h"
+#include "smartmill_program/plan/speed_planner.h"
 #include "smartmill_program/program_analysis.h"
 #include "smartmill_program/report/program_page.h"
 #include "smartmill_program/report/tables.h"
@@ -53,6 +54,9 @@ struct Arguments {
   double most_force_n = FeedLimits::UNLIMITED, most_torque_nm = FeedLimits::UNLIMITED,
          most_power_w = FeedLimits::UNLIMITED, most_chip_mm = FeedLimits::UNLIMITED, least_chip_mm = 0.0,
          most_feed_per_tooth_mm = FeedLimits::UNLIMITED, most_feed_mm_per_min = FeedLimits::UNLIMITED;
+  bool chatter_probability = false;
+  std::vector<double> speeds_rpm;  // lowest, highest; empty: the S words stay
+  double most_chatter_probability = stability::RiskOptions().risk;
 };
 
 /// @throws UsageError, Error
@@ -157,18 +161,40 @@ class ProgressLine {
   bool open_ = false;
 };
 
-/// Plans the feeds, after the analysis of the program. @return exit code
-int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& planner,
-              const std::vector<Move>& moves, const AnalysisResult& before, const AnalysisOptions& options) {
+/// A program and what its plan requires.
+struct PlanJob {
+  const Arguments& arguments;
+  const std::string& text;
+  const ReaderOptions& reader;
+  ToolModels& models;
+  const AnalysisOptions& options;
+
+  Stock stock() const { return Stock(stockOf(arguments), arguments.resolution_mm * MM); }
+};
+
+SpeedLimits speedLimitsOf(const Arguments& arguments) {
+  SpeedLimits limits;
+  limits.low = units::radPerSecFromRpm(arguments.speeds_rpm[0]);
+  limits.high = units::radPerSecFromRpm(arguments.speeds_rpm[1]);
+  limits.risk.risk = arguments.most_chatter_probability;
+  return limits;
+}
+
+int notWritten(const Arguments& arguments) {
+  std::fprintf(stderr, "interrupted; %s has not been written\n", arguments.plan.c_str());
+  return INTERRUPTED;
+}
+
+/// Plans the feeds, after the analysis of the program with its planned speeds. @return exit code
+int writePlan(const PlanJob& job, FeedPlanner& planner, const AnalysedProgram& program,
+              const AnalysedProgram& original) {
+  const Arguments& arguments = job.arguments;
+  const std::string& text = job.text;
   ProgressLine progress;
-  const Stock stock(stockOf(arguments), arguments.resolution_mm * MM);
-  const FeedPlan plan =
-      planner.plan(moves, before, stock, options, [&](double share) { return progress(share); });
+  const FeedPlan plan = planner.plan(program, original, job.stock(), job.options,
+                                     [&](double share) { return progress(share); });
   progress.close();
-  if (plan.interrupted) {
-    std::fprintf(stderr, "interrupted; %s has not been written\n", arguments.plan.c_str());
-    return INTERRUPTED;
-  }
+  if (plan.interrupted) return notWritten(arguments);
   writeText(arguments.plan, plan.text);
   writeText(arguments.out + "/plan.diff", planDiff(text, plan.text, arguments.program, arguments.plan));
   planTable(plan).save(arguments.out + "/plan.csv");
@@ -176,14 +202,43 @@ int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& 
   return 0;
 }
 
+/// Plans the speeds, analyses the program with them and plans its feeds. @return exit code
+int writePlanWithSpeeds(const PlanJob& job, SpeedPlanner& planner, const AnalysedProgram& original) {
+  const Arguments& arguments = job.arguments;
+  ProgressLine progress;
+  const std::vector<PlannedSpeed> speeds = planner.plan([&](double share) { return progress(share); });
+  if (stop_requested != 0) {
+    progress.close();
+    return notWritten(arguments);
+  }
+  const SpeedText text = withSpeeds(job.text, speeds);
+  FeedPlanner feeds(arguments.program, text.text, job.reader, job.models, limitsOf(arguments, job.models),
+                    text.ratios);
+  const std::vector<Move> moves = interpretProgram(text.text, arguments.program, job.reader);
+  Stock stock = job.stock();
+  const AnalysisResult analysis =
+      ProgramAnalysis(arguments.program, job.models, stock, job.options)
+          .run(
+              moves, [&](const Step& step, const StepPrediction&) { feeds.add(step); },
+              [&](double share) { return progress(share); });
+  progress.close();
+  if (analysis.interrupted) return notWritten(arguments);
+  std::cout << speedSummary(speeds);
+  return writePlan(job, feeds, {moves, analysis}, original);
+}
+
 int run(const Arguments& arguments) {
   ToolModels models(arguments.models);
   const ReaderOptions reader = readerOptions(arguments, models);
   const std::string text = readText(arguments.program);
+  AnalysisOptions options;
+  const PlanJob job{arguments, text, reader, models, options};
   std::optional<FeedPlanner> planner;
+  std::optional<SpeedPlanner> speeds;
   if (!arguments.plan.empty()) {
     refuseToReplace(arguments);
     planner.emplace(arguments.program, text, reader, models, limitsOf(arguments, models));
+    if (!arguments.speeds_rpm.empty()) speeds.emplace(models, speedLimitsOf(arguments));
   }
   const std::vector<Move> moves = arguments.linuxcnc ? interpretWithLinuxcnc(text, arguments.program, reader)
                                                      : interpretProgram(text, arguments.program, reader);
@@ -192,10 +247,10 @@ int run(const Arguments& arguments) {
   std::filesystem::create_directories(arguments.out, failed);
   if (failed) throw Error(arguments.out + ": " + failed.message());
 
-  AnalysisOptions options;
   options.simulation.step_share = arguments.step;
   options.simulation.rapid = models.rapid();
   options.stability = arguments.stability;
+  options.probability = arguments.chatter_probability;
   ProgramAnalysis analysis(arguments.program, models, stock, options);
   StepTable steps;
   PathView path(stock.block(), arguments.colour);
@@ -206,7 +261,11 @@ int run(const Arguments& arguments) {
       [&](const Step& step, const StepPrediction& prediction) {
         steps.add(step, prediction);
         path.add(step, prediction);
-        if (planner) planner->add(step);
+        if (speeds) {
+          speeds->add(step);
+        } else if (planner) {
+          planner->add(step);
+        }
       },
       [&](double share) { return progress(share); });
   progress.close();
@@ -227,7 +286,8 @@ int run(const Arguments& arguments) {
   }
   if (const std::string collision = collisionText(arguments.program, result.blocks); !collision.empty())
     throw Error(collision);
-  return planner ? writePlan(arguments, text, *planner, moves, result, options) : 0;
+  if (speeds) return writePlanWithSpeeds(job, *speeds, {moves, result});
+  return planner ? writePlan(job, *planner, {moves, result}, {moves, result}) : 0;
 }
 
 }  // namespace
@@ -249,7 +309,10 @@ Command programCommand() {
                        "another corner, two tools, path coloured by the stability margin"},
                       {"part.nc --stock-mm 100 60 20 --model mill.yaml -o part --plan planned.nc "
                        "--most-force-n 400 --most-chip-mm 0.1",
-                       "feeds that hold 400 N and 0.1 mm, as a new program"}};
+                       "feeds that hold 400 N and 0.1 mm, as a new program"},
+                      {"part.nc --stock-mm 100 60 20 --model mill.yaml -o part --plan planned.nc "
+                       "--most-chip-mm 0.1 --plan-speeds-rpm 4000 12000",
+                       "spindle speeds as well, each with a probability of chatter of at most 5 %"}};
   command.files = {{"OUT/blocks.csv", "a row for each executed block"},
                    {"OUT/steps.csv", "a row for each step of a feed motion"},
                    {"OUT/report.html", "the tool path from above and the table of the blocks"},
@@ -292,6 +355,8 @@ Command programCommand() {
         .oneOf(colourNames())
         .showDefault();
     line.flag("!--no-stability", arguments.stability, "leaves out the stability limits");
+    line.flag("--chatter-probability", arguments.chatter_probability,
+              "probability that each step chatters, by machines drawn from the deviations of the model");
     const auto plan =
         line.option("--plan", arguments.plan,
                     "writes the program with feeds that hold the following limits to this file");
@@ -308,6 +373,17 @@ Command programCommand() {
     limit("--least-chip-mm", arguments.least_chip_mm,
           "largest chip thickness below which a block is reported [mm]");
     limit("--most-feed-per-tooth-mm", arguments.most_feed_per_tooth_mm, "feed per tooth along the path [mm]");
+    line.option(
+            "--plan-speeds-rpm", arguments.speeds_rpm,
+            "lowest and highest spindle speed [rpm]: each S word gets the highest speed at which its cuts "
+            "hold --most-chatter-probability")
+        .count(2, 2)
+        .needs(plan);
+    line.option("--most-chatter-probability", arguments.most_chatter_probability,
+                "[1] of each cut, at planned speeds")
+        .within(0.0, 1.0)
+        .showDefault()
+        .needs(plan);
     limit("--most-feed-mm-per-min", arguments.most_feed_mm_per_min,
           "feed of the machine [mm/min] (default: rapid feed of the model)");
   });

@@ -84,6 +84,7 @@ void Interpreter::setModes(Block& block) {
   if (const Word* word = block.take('S')) {
     if (*word->value < 0.0) refuse(*word, word->text() + ", expected a speed of 0 or more");
     speed_ = units::radPerSecFromRpm(*word->value);
+    speed_line_ = line_;
   }
   setTool(block);
   for (const int turn : {3, 4, 5})
@@ -343,6 +344,7 @@ void Interpreter::add(const PathSegment& path, bool rapid, double feed, double d
   }
   move.dwell = dwell;
   move.spindle_speed = turns_ == 0 ? 0.0 : speed_;
+  move.speed_line = speed_line_;
   move.left_hand = turns_ == 4;
   move.tool = tool_;
   compensated([&] { compensation_.add(move); });

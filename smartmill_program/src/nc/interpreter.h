@@ -88,6 +88,7 @@ class Interpreter {
   std::optional<double> feed_;           // [m/min], [m/rev] or [1/min]
   FeedWord feed_word_;                   // of feed_; without its unit
   double speed_ = 0.0;                   // [rad/s]
+  int speed_line_ = 0;                   // that states it
   int turns_ = 0;                        // 3 M3, 4 M4, 0 at rest
   int selected_tool_ = 0, tool_ = 0;
   CutterCompensation compensation_;

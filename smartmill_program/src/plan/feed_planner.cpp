@@ -50,8 +50,15 @@ FeedLimit exceeded(const StepPrediction& prediction, const FeedLimits& limits) {
 }  // namespace
 
 FeedPlanner::FeedPlanner(const std::string& name, const std::string& text, const ReaderOptions& reader,
-                         ToolModels& models, const FeedLimits& limits)
-    : name_(name), text_(text), reader_(reader), models_(models), limits_(limits), bounds_(models, limits_) {
+                         ToolModels& models, const FeedLimits& limits,
+                         const std::map<int, double>& speed_ratios)
+    : name_(name),
+      text_(text),
+      reader_(reader),
+      models_(models),
+      limits_(limits),
+      speed_ratios_(speed_ratios),
+      bounds_(models, limits_, speed_ratios_) {
   limits.validate();
 }
 
@@ -78,7 +85,8 @@ void FeedPlanner::addMoves(const std::vector<Move>& moves) {
     const FeedBound bound = bounds_.of(move);
     line.bound.lower(bound.feed / word.unit, bound.limit);
     // The tool drills by pecks: what is air in one step is the hole of the previous one.
-    if (move.operation.size() > 2) line.bound.lower(word.value, FeedLimit::no_model);
+    if (move.operation.size() > 2)
+      line.bound.lower(bounds_.originalFeed(move) / word.unit, FeedLimit::no_model);
     line.old_low = std::min(line.old_low, word.value);
     line.old_high = std::max(line.old_high, word.value);
   }
@@ -99,13 +107,13 @@ void FeedPlanner::choose(int line, LineFeed& feed) const {
 }
 
 std::string FeedPlanner::rewritten() const {
-  FeedText text(text_);
+  ProgramWords text(text_);
   for (const auto& [line, feed] : lines_) {
-    const bool has = text.hasFeed(line);
+    const bool has = text.has(line, 'F');
     const bool same = has && !feed.stated && feed.old_low == feed.value && feed.old_high == feed.value;
     if ((!has && !feed.stated) || same) continue;
     try {
-      text.setFeed(line, feed.number);
+      text.set(line, 'F', feed.number);
     } catch (const Error& error) {
       throw Error(name_ + ": " + error.what());
     }
@@ -138,9 +146,10 @@ std::vector<Move> FeedPlanner::completed(std::string* text) {
   }
 }
 
-FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult& before, const Stock& stock,
-                           const AnalysisOptions& options, const ProgramAnalysis::Progress& progress) {
-  addMoves(moves);
+FeedPlan FeedPlanner::plan(const AnalysedProgram& program, const AnalysedProgram& original,
+                           const Stock& stock, const AnalysisOptions& options,
+                           const ProgramAnalysis::Progress& progress) {
+  addMoves(program.moves);
   for (auto& [line, feed] : lines_) choose(line, feed);
   AnalysisOptions without_stability = options;
   without_stability.stability = false;
@@ -173,23 +182,23 @@ FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult&
     }
     holds = failed.empty();
   }
-  if (!plan.interrupted) describe(moves, planned, {before, after, chips}, options.simulation.rapid, plan);
+  if (!plan.interrupted)
+    describe({program, original, {planned, after}, chips}, options.simulation.rapid, plan);
   return plan;
 }
 
-void FeedPlanner::describe(const std::vector<Move>& moves, const std::vector<Move>& planned,
-                           const Analyses& analyses, double rapid, FeedPlan& plan) const {
-  const auto& [before, after, chips] = analyses;
-  plan.old_steady_time = before.time;
-  plan.new_steady_time = after.time;
+void FeedPlanner::describe(const Described& described, double rapid, FeedPlan& plan) const {
+  const auto& [program, original, planned, chips] = described;
+  plan.old_steady_time = original.analysis.time;
+  plan.new_steady_time = planned.analysis.time;
   plan.lines = lines_.size();
   for (const auto& [line, feed] : lines_)
     plan.changed += feed.value != feed.old_low || feed.value != feed.old_high;
   std::map<std::size_t, const BlockSummary*> old_blocks, new_blocks;
-  for (const BlockSummary& block : before.blocks) old_blocks[block.block] = &block;
-  for (const BlockSummary& block : after.blocks) new_blocks[block.block] = &block;
-  for (std::size_t i = 0; i < moves.size(); ++i) {
-    const Move &from = moves[i], &to = planned[i];
+  for (const BlockSummary& block : program.analysis.blocks) old_blocks[block.block] = &block;
+  for (const BlockSummary& block : planned.analysis.blocks) new_blocks[block.block] = &block;
+  for (std::size_t i = 0; i < original.moves.size(); ++i) {
+    const Move &from = original.moves[i], &to = planned.moves[i];
     const FeedBound bound = bounds_.of(from);  // the control slows down on arcs by itself
     const double acceleration = limits_.acceleration;
     const double old_time = timeOf(from, rapid, acceleration, bound),
@@ -205,6 +214,8 @@ void FeedPlanner::describe(const std::vector<Move>& moves, const std::vector<Mov
       block.operation = from.operation;
       block.old_feed = from.feed;
       block.new_feed = to.feed;
+      block.old_speed = from.spindle_speed;
+      block.new_speed = to.spindle_speed;
       block.limit = lines_.at(from.line).bound.limit;
       const auto chip = chips.find(from.block);
       if (chip != chips.end()) block.chip = chip->second;

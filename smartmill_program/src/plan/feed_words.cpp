@@ -1,6 +1,7 @@
 #include "feed_words.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <string_view>
 
@@ -24,24 +25,24 @@ bool isBlank(char c) {
   return std::string_view(" \t\n\v\f\r\0", 7).find(c) != std::string_view::npos;
 }
 
-/// Where the F word and the words of a line are.
+/// Where a word and the words of a line are.
 struct WordPlaces {
-  std::size_t feed = std::string::npos, feed_end = 0;  // number of the F word: behind F to its last character
-  bool commented = false;                              // a comment within it
-  std::size_t end = 0;                                 // behind the last word
-  bool blanks = false;                                 // between words
+  std::size_t number = std::string::npos, number_end = 0;  // behind the letter to the last character
+  bool commented = false;                                  // a comment within it
+  std::size_t end = 0;                                     // behind the last word
+  bool blanks = false;                                     // between words
 };
 
 // As the lexer: comments in parentheses, and behind ';'.
-WordPlaces placesIn(const std::string& line) {
+WordPlaces placesIn(const std::string& line, char letter) {
   WordPlaces places;
-  bool comment = false, in_feed = false, comment_in_feed = false, blank = false;
+  bool comment = false, in_word = false, comment_in_word = false, blank = false;
   int depth = 0;  // of brackets
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
     if (c == '(' || c == ')') {
       comment = c == '(';
-      comment_in_feed = comment_in_feed || in_feed;
+      comment_in_word = comment_in_word || in_word;
       continue;
     }
     if (comment) continue;
@@ -54,15 +55,15 @@ WordPlaces placesIn(const std::string& line) {
     const bool number =
         depth > 0 || (c >= '0' && c <= '9') || std::string_view(".+-#[").find(c) != std::string_view::npos;
     depth += (c == '[') - (c == ']');
-    in_feed = in_feed && number;
-    if (depth == 0 && (c == 'F' || c == 'f')) {
-      in_feed = true;
-      comment_in_feed = false;
-      places.feed = i + 1;
-      places.feed_end = i + 1;
-    } else if (in_feed) {
-      places.commented = places.commented || comment_in_feed;
-      places.feed_end = i + 1;
+    in_word = in_word && number;
+    if (depth == 0 && std::toupper(static_cast<unsigned char>(c)) == letter) {
+      in_word = true;
+      comment_in_word = false;
+      places.number = i + 1;
+      places.number_end = i + 1;
+    } else if (in_word) {
+      places.commented = places.commented || comment_in_word;
+      places.number_end = i + 1;
     }
     places.end = i + 1;
   }
@@ -95,27 +96,27 @@ std::string feedNumberOf(double value) {
   return withoutTrailingZeros(formatted("%.*f", std::max(0, MOST_DIGITS - before), value));
 }
 
-FeedText::FeedText(const std::string& text) : lines_(linesOf(text)) {
+ProgramWords::ProgramWords(const std::string& text) : lines_(linesOf(text)) {
 }
 
-bool FeedText::hasFeed(int line) const {
-  return placesIn(lines_.at(static_cast<std::size_t>(line - 1))).feed != std::string::npos;
+bool ProgramWords::has(int line, char letter) const {
+  return placesIn(lines_.at(static_cast<std::size_t>(line - 1)), letter).number != std::string::npos;
 }
 
-void FeedText::setFeed(int line, const std::string& number) {
+void ProgramWords::set(int line, char letter, const std::string& number) {
   std::string& text = lines_.at(static_cast<std::size_t>(line - 1));
-  const WordPlaces places = placesIn(text);
-  if (places.feed == std::string::npos) {
-    text.insert(places.end, (places.blanks ? " F" : "F") + number);
+  const WordPlaces places = placesIn(text, letter);
+  if (places.number == std::string::npos) {
+    text.insert(places.end, (places.blanks ? " " : "") + (letter + number));
     return;
   }
   if (places.commented)
-    throw Error("line " + std::to_string(line) +
-                ": a comment within the F word, expected it behind the word");
-  text.replace(places.feed, places.feed_end - places.feed, number);
+    throw Error("line " + std::to_string(line) + ": a comment within the " + letter +
+                " word, expected it behind the word");
+  text.replace(places.number, places.number_end - places.number, number);
 }
 
-std::string FeedText::text() const {
+std::string ProgramWords::text() const {
   std::string text;
   for (const std::string& line : lines_) text += line;
   return text;

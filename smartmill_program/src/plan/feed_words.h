@@ -15,17 +15,16 @@ std::string feedNumberUpTo(double value);
 /// The value of an F word as a number of at most twelve digits.
 std::string feedNumberOf(double value);
 
-/// Text of a program whose F words change; everything else stays byte for byte.
-class FeedText {
+/// Text of a program whose F and S words change; everything else stays byte for byte.
+class ProgramWords {
  public:
-  explicit FeedText(const std::string& text);
+  explicit ProgramWords(const std::string& text);
 
-  /// Whether a line has an F word. @param line from 1
-  bool hasFeed(int line) const;
-  /// Replaces the number of the F word of a line, or adds the word behind the last word.
-  /// @throws Error "line N: ..." on a comment within the F word
-  void setFeed(int line, const std::string& number);
-  /// @throws Error as setFeed
+  /// Whether a line has a word. @param line from 1 @param letter F or S
+  bool has(int line, char letter) const;
+  /// Replaces the number of the word of a line, or adds the word behind the last word.
+  /// @throws Error "line N: ..." on a comment within the word
+  void set(int line, char letter, const std::string& number);
   std::string text() const;
 
  private:

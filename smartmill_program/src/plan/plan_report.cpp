@@ -97,13 +97,32 @@ std::string planDiff(const std::string& text, const std::string& planned, const 
 CsvWriter planTable(const FeedPlan& plan) {
   CsvWriter csv(
       "block,line,operation,tool,length_mm,old_feed_mm_per_min,new_feed_mm_per_min,reached_mm_per_min,limit,"
-      "old_time_s,new_time_s,chip_mm,peak_force_n,peak_torque_nm,power_w,stability_margin",
+      "old_time_s,new_time_s,chip_mm,peak_force_n,peak_torque_nm,power_w,stability_margin,old_speed_rpm,"
+      "new_speed_rpm",
       7);
   for (const PlannedBlock& b : plan.blocks)
     csv.row(b.block + 1, b.line, b.operation, b.tool, b.length / MM, b.old_feed / MM_PER_MIN,
             b.new_feed / MM_PER_MIN, b.reached / MM_PER_MIN, nameOf(b.limit), b.old_time, b.new_time,
-            b.chip / MM, b.peak_force, b.peak_torque, b.power, b.margin);
+            b.chip / MM, b.peak_force, b.peak_torque, b.power, b.margin, units::rpmFromRadPerSec(b.old_speed),
+            units::rpmFromRadPerSec(b.new_speed));
   return csv;
+}
+
+std::string speedSummary(const std::vector<PlannedSpeed>& speeds) {
+  std::string text;
+  for (const PlannedSpeed& planned : speeds) {
+    const double old_rpm = units::rpmFromRadPerSec(planned.old_speed);
+    if (planned.new_speed) {
+      text +=
+          formatted("speed of line %d (T%d): %.0f rpm before, %.0f rpm after, probability of chatter %.3g\n",
+                    planned.line, planned.tool, old_rpm, units::rpmFromRadPerSec(*planned.new_speed),
+                    *planned.probability);
+    } else {
+      text += formatted("speed of line %d (T%d): %.0f rpm stays, %s\n", planned.line, planned.tool, old_rpm,
+                        planned.reason.c_str());
+    }
+  }
+  return text;
 }
 
 std::string planSummary(const FeedPlan& plan, const FeedLimits& limits) {

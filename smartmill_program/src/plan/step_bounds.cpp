@@ -86,6 +86,13 @@ FeedBound StepBounds::of(const Move& move) const {
   return bound;
 }
 
+/// A feed per revolution follows the speed by itself.
+double StepBounds::originalFeed(const Move& move) const {
+  const auto ratio = speed_ratios_.find(move.speed_line);
+  const bool follows = move.feed_word.mode == FeedMode::per_revolution;
+  return ratio == speed_ratios_.end() || follows ? move.feed : move.feed * ratio->second;
+}
+
 FeedBound StepBounds::of(const Step& step) const {
   FeedBound bound;
   if (step.air()) return bound;
@@ -93,7 +100,7 @@ FeedBound StepBounds::of(const Step& step) const {
   const MachineModel& model = models_.of(move.tool);
   const double tooth_rate = model.tool->teeth * move.spindle_speed / units::TWO_PI;  // [1/s]
   bound.lower(limits_.feed_per_tooth * tooth_rate, FeedLimit::feed_per_tooth);
-  if (step.face_volume > 0.0 || step.contact.empty()) bound.lower(move.feed, FeedLimit::no_model);
+  if (step.face_volume > 0.0 || step.contact.empty()) bound.lower(originalFeed(move), FeedLimit::no_model);
   if (!step.contact.empty()) {
     const double rate = tooth_rate / step.feed_share;  // [1/s] feed over horizontal feed per tooth
     bound.lower(limits_.chip / largestChip(*model.tool, step.contact, 1.0) * rate, FeedLimit::chip);

@@ -4,6 +4,13 @@
 
 namespace smartmill::program {
 
+/// Every probability is computed.
+stability::RiskOptions StepPredictor::anyRisk() {
+  stability::RiskOptions options;
+  options.risk = 1.0;
+  return options;
+}
+
 StepPredictor::OfTool& StepPredictor::of(int tool) {
   std::unique_ptr<OfTool>& place = tools_[tool];
   if (!place) {
@@ -23,8 +30,13 @@ StepPrediction StepPredictor::predict(const Step& step) {
   if (step.contact.empty()) return prediction;
   prediction.force = tool.force.predict(step.contact, prediction.feed_per_tooth * step.feed_share);
   prediction.power = prediction.force.mean.torque * move.spindle_speed;
-  if (with_stability_ && tool.limits.available())
-    prediction.limit = tool.limits.limit(step.contact, step.feed_angle, move.left_hand, move.spindle_speed);
+  if (with_stability_ && tool.limits.available()) {
+    const EngagementCell cell = EngagementCell::of(step.contact, step.feed_angle, move.left_hand);
+    prediction.limit = tool.limits.limit(cell, move.spindle_speed);
+    if (with_probability_)
+      prediction.chatter =
+          tool.risk.rounded(cell, move.spindle_speed, step.contact.axialDepth()).value_or(1.0);
+  }
   if (with_stability_ && tool.walls.available() && prediction.limit > step.contact.axialDepth())
     prediction.wall_error = tool.walls.error(step.contact, step.feed_angle, move.left_hand,
                                              move.spindle_speed, prediction.feed_per_tooth * step.feed_share);

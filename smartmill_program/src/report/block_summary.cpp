@@ -43,6 +43,7 @@ void BlockSummary::add(const Step& step, const StepPrediction& prediction) {
   raise(peak_force, prediction.force.peak_force);
   raise(peak_torque, prediction.force.peak_torque);
   raise(power, prediction.power);
+  raise(chatter, prediction.chatter);
   lower(margin, prediction.limit / step.contact.axialDepth());
   if (std::isnan(wall_error) || std::abs(prediction.wall_error) > std::abs(wall_error))
     wall_error = prediction.wall_error;

@@ -27,6 +27,7 @@ constexpr std::array<Quantity, PathView::QUANTITIES> ALL{{{"force", "peak force 
                                                           {"depth", "axial depth [mm]", false},
                                                           {"immersion", "immersion [deg]", false},
                                                           {"margin", "stability limit / axial depth", true},
+                                                          {"chatter", "probability of chatter", false},
                                                           {"surface", "surface location error [um]", false}}};
 
 std::array<double, PathView::QUANTITIES> valuesOf(const Step& step, const StepPrediction& prediction) {
@@ -40,6 +41,7 @@ std::array<double, PathView::QUANTITIES> valuesOf(const Step& step, const StepPr
           depth / MM,
           degFromRad(step.contact.exit() - step.contact.entry()),
           std::isnan(prediction.limit) ? prediction.limit : std::min(prediction.limit / depth, MOST_MARGIN),
+          prediction.chatter,
           prediction.wall_error / units::UM};
 }
 

@@ -44,13 +44,13 @@ CsvWriter blockTable(const std::vector<BlockSummary>& blocks) {
       "tooth_mm,"
       "volume_mm3,face_volume_mm3,peak_force_n,peak_torque_nm,power_w,stability_margin,wall_error_um,air_"
       "share,rapid_hit,"
-      "holder_hit",
+      "holder_hit,chatter_probability",
       7);
   for (const BlockSummary& b : blocks) {
     csv.row(b.block + 1, b.line, b.operation, b.tool, b.length / MM, b.time, b.axial_depth / MM,
             b.radial_depth / MM, degFromRad(b.entry), degFromRad(b.exit), b.feed_per_tooth / MM,
             b.volume / MM3, b.face_volume / MM3, b.peak_force, b.peak_torque, b.power, b.margin,
-            b.wall_error / units::UM, b.airShare(), b.rapid_hit ? 1 : 0, b.holder_hit ? 1 : 0);
+            b.wall_error / units::UM, b.airShare(), b.rapid_hit ? 1 : 0, b.holder_hit ? 1 : 0, b.chatter);
   }
   return csv;
 }
@@ -61,7 +61,7 @@ StepTable::StepTable()
           "radial_depth_mm,"
           "feed_per_tooth_mm,volume_mm3,face_volume_mm3,air,mean_fx_n,mean_fy_n,mean_fz_n,mean_torque_nm,"
           "peak_force_n,"
-          "peak_torque_nm,power_w,stability_limit_mm,wall_error_um,arcs",
+          "peak_torque_nm,power_w,stability_limit_mm,chatter_probability,wall_error_um,arcs",
           7) {
 }
 
@@ -83,7 +83,10 @@ void StepTable::add(const Step& step, const StepPrediction& prediction) {
   for (const double value : {force.mean.fx, force.mean.fy, force.mean.fz, force.mean.torque, force.peak_force,
                              force.peak_torque, prediction.power})
     csv_.cell(side ? value : none);
-  csv_.cell(prediction.limit / MM).cell(prediction.wall_error / units::UM).cell(arcsText(step.contact));
+  csv_.cell(prediction.limit / MM)
+      .cell(prediction.chatter)
+      .cell(prediction.wall_error / units::UM)
+      .cell(arcsText(step.contact));
   csv_.endRow();
 }
 
@@ -119,6 +122,8 @@ std::string summaryOf(const std::vector<BlockSummary>& blocks) {
   b = largest(blocks, &BlockSummary::margin, true);
   line("least stability margin", b, b ? b->margin : 0.0, "");
   if (b) text += formatted("%zu blocks above the stability limit\n", unstable);
+  b = largest(blocks, &BlockSummary::chatter);
+  line("probability of chatter", b, b ? b->chatter : 0.0, "");
   b = nullptr;
   for (const BlockSummary& block : blocks)
     if (!std::isnan(block.wall_error) && (!b || std::abs(block.wall_error) > std::abs(b->wall_error)))

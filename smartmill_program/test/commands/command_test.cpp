@@ -17,6 +17,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* MODEL =
     "format: smartmill-model/1\ntool: {teeth: 4, diameter_mm: 10.0, helix_deg: 30.0}\ncutting:\n  "
@@ -59,7 +60,7 @@ TEST_F(Command, WritesBlocksStepsAndPage) {
   std::vector<std::string_view> cells;
   std::vector<double> volumes;
   while (blocks.nextFilled(&cells)) {
-    ASSERT_EQ(cells.size(), 21u);
+    ASSERT_EQ(cells.size(), 22u);
     if (cells[2] == "G1") volumes.push_back(blocks.number(cells[11], "volume_mm3"));
   }
   ASSERT_EQ(volumes.size(), 2u);
@@ -143,8 +144,22 @@ TEST_F(Command, PlanWritesProgramDifferenceAndTable) {
   EXPECT_EQ(read("result/plan.diff"), read("expected.diff"));
   CsvReader blocks(folder_.file("result/plan.csv"));
   std::vector<std::string_view> cells;
-  while (blocks.nextFilled(&cells)) EXPECT_EQ(cells.size(), 16u);
+  while (blocks.nextFilled(&cells)) EXPECT_EQ(cells.size(), 18u);
   EXPECT_EQ(blocks.line(), 4);
+}
+
+TEST_F(Command, PlansSpeedsAndStatesProbabilities) {
+  const std::string text = "G21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nG0 Z5\nM30\n";
+  const std::string options =
+      "--model mill.yaml --plan new.nc --most-chip-mm 0.1 --most-feed-mm-per-min 9000 ";
+  EXPECT_EQ(run(text, options + "--plan-speeds-rpm 5000 20000 --chatter-probability"), 0) << read("err");
+  EXPECT_THAT(read("out"), AllOf(HasSubstr("speed of line 2 (T0): 3000 rpm before, "),
+                                 HasSubstr("probability of chatter")));
+  EXPECT_THAT(read("new.nc"), Not(HasSubstr("S3000")));
+  EXPECT_THAT(read("result/blocks.csv"), HasSubstr("holder_hit,chatter_probability\n"));
+  EXPECT_EQ(run(text, options + "--plan-speeds-rpm 9000 4000"), 1);
+  EXPECT_EQ(read("err"), "program: speeds of 9000 to 4000 rpm: expected 0 < low <= high\n");
+  EXPECT_EQ(run(text, "--model mill.yaml --plan-speeds-rpm 4000 9000"), 2);  // without --plan
 }
 
 TEST_F(Command, PlanRefusesWhatItCannotDo) {

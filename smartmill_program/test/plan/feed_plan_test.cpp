@@ -60,7 +60,7 @@ Planned planOf(const std::string& text, const FeedLimits& limits, const std::str
         planner.add(step);
       });
   Planned result;
-  result.plan = planner.plan(moves, before, stock, {});
+  result.plan = planner.plan({moves, before}, {moves, before}, stock, {});
   result.moves = interpretProgram(result.plan.text, "planned.nc");
   Stock again = stock;
   ProgramAnalysis("planned.nc", models, again)

@@ -112,7 +112,7 @@ void planJob(const Job& job, bool raised, Score& total) {
   const AnalysisResult before =
       ProgramAnalysis(job.name, models, second, options)
           .run(moves, [&](const Step& step, const StepPrediction&) { planner.add(step); });
-  const FeedPlan plan = planner.plan(moves, before, stock, options);
+  const FeedPlan plan = planner.plan({moves, before}, {moves, before}, stock, options);
 
   const std::vector<Move> planned = interpretProgram(plan.text, job.name);
   std::map<std::size_t, Worst> worst;

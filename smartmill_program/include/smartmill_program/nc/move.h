@@ -31,6 +31,7 @@ struct Move {
   FeedWord feed_word;          ///< of a feed motion
   double dwell = 0.0;          ///< [s] after the motion
   double spindle_speed = 0.0;  ///< [rad/s] >= 0
+  int speed_line = 0;          ///< that states the S word in force; 0: none
   bool left_hand = false;      ///< M4: the teeth move counterclockwise
   int tool = 0;                ///< T; 0: the program has not changed the tool
 };

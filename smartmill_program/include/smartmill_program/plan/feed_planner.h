@@ -19,14 +19,15 @@ struct PlannedBlock {
   std::size_t block = 0;  ///< in the order of execution, from 0
   int line = 0, tool = 0;
   std::string operation;
-  double length = 0.0;                    ///< [m] at feed
-  double old_feed = 0.0, new_feed = 0.0;  ///< [m/s]
-  double reached = 0.0;                   ///< [m/s] highest speed between rest and rest, at the new feed
-  double old_time = 0.0, new_time = 0.0;  ///< [s] from rest to rest, at feed
-  FeedLimit limit = FeedLimit::none;      ///< that binds; acceleration also where the feed is not reached
-  double chip = NONE;                     ///< [m] largest chip thickness at the new feed
+  double length = 0.0;                      ///< [m] at feed
+  double old_feed = 0.0, new_feed = 0.0;    ///< [m/s]
+  double old_speed = 0.0, new_speed = 0.0;  ///< [rad/s]
+  double reached = 0.0;                     ///< [m/s] highest speed between rest and rest, at the new feed
+  double old_time = 0.0, new_time = 0.0;    ///< [s] from rest to rest, at feed
+  FeedLimit limit = FeedLimit::none;        ///< that binds; acceleration also where the feed is not reached
+  double chip = NONE;                       ///< [m] largest chip thickness at the new feed
   double peak_force = NONE, peak_torque = NONE, power = NONE;  ///< [N], [N m], [W] at the new feed
-  double margin = NONE;                                        ///< [1] of stability; independent of the feed
+  double margin = NONE;  ///< [1] of stability at the new speed; independent of the feed
 };
 
 struct FeedPlan {
@@ -39,24 +40,34 @@ struct FeedPlan {
   bool interrupted = false;
 };
 
+/// A program with its analysis.
+struct AnalysedProgram {
+  const std::vector<Move>& moves;
+  const AnalysisResult& analysis;
+};
+
 /// Feeds of a program that hold limits at every step. A line has one feed in all its executions, that of the
 /// worst step. The planned program is analysed as it is written.
 class FeedPlanner {
  public:
-  /// @param text of the program. @param name for messages
+  /// @param text of the program, with its planned speeds @param name for messages
+  /// @param speed_ratios [1] planned over original speed by the line of the S word
   /// @throws Error as FeedLimits::validate
   FeedPlanner(const std::string& name, const std::string& text, const ReaderOptions& reader,
-              ToolModels& models, const FeedLimits& limits);
+              ToolModels& models, const FeedLimits& limits, const std::map<int, double>& speed_ratios = {});
+
+  FeedPlanner(const FeedPlanner&) = delete;  // StepBounds refers to members
+  FeedPlanner& operator=(const FeedPlanner&) = delete;
 
   const FeedLimits& limits() const { return limits_; }
 
   /// Takes a step of the analysis of the program. @throws Error as StepBounds
   void add(const Step& step);
 
-  /// @param moves of the program, all of whose steps have been added. @param before its analysis
+  /// @param program all of whose steps have been added @param original with its own speeds
   /// @param stock before the program
   /// @throws Error "NAME: line N: ..." when no feed holds a limit
-  FeedPlan plan(const std::vector<Move>& moves, const AnalysisResult& before, const Stock& stock,
+  FeedPlan plan(const AnalysedProgram& program, const AnalysedProgram& original, const Stock& stock,
                 const AnalysisOptions& options, const ProgramAnalysis::Progress& progress = {});
 
  private:
@@ -74,20 +85,19 @@ class FeedPlanner {
   void choose(int line, LineFeed& feed) const;
   std::string rewritten() const;
   std::vector<Move> completed(std::string* text);
-  /// Of the program and its plan.
-  struct Analyses {
-    const AnalysisResult &before, &after;
+  struct Described {
+    const AnalysedProgram &program, &original, &planned;
     const std::map<std::size_t, double>& chips;  // [m] of the plan, by executed block
   };
   /// Times and blocks of a plan. @param rapid [m/s]
-  void describe(const std::vector<Move>& moves, const std::vector<Move>& planned, const Analyses& analyses,
-                double rapid, FeedPlan& plan) const;
+  void describe(const Described& described, double rapid, FeedPlan& plan) const;
   [[noreturn]] void fail(int line, const std::string& message) const;
 
   std::string name_, text_;
   ReaderOptions reader_;
   ToolModels& models_;
   FeedLimits limits_;
+  std::map<int, double> speed_ratios_;
   StepBounds bounds_;
   std::map<int, LineFeed> lines_;
 };

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "smartmill_program/engagement/cut_simulation.h"
+#include "smartmill_program/prediction/chatter_risk.h"
 #include "smartmill_program/prediction/force_predictor.h"
 #include "smartmill_program/prediction/stability_limits.h"
 #include "smartmill_program/prediction/tool_models.h"
@@ -19,6 +20,7 @@ struct StepPrediction {
   ForcePrediction force;                                             ///< of the side of the tool
   double power = 0.0;                                                ///< [W] mean, of the cut
   double limit = std::numeric_limits<double>::quiet_NaN();           ///< [m] stability limit
+  double chatter = std::numeric_limits<double>::quiet_NaN();         ///< [1] probability of chatter
   double wall_error = std::numeric_limits<double>::quiet_NaN();      ///< [m] of a stable cut (WallErrors)
 };
 
@@ -26,7 +28,9 @@ struct StepPrediction {
 class StepPredictor {
  public:
   /// @param with_stability computes limits for the models that state modes of the tool tip
-  StepPredictor(ToolModels& models, bool with_stability) : models_(models), with_stability_(with_stability) {}
+  /// @param with_probability the probabilities of chatter as well
+  StepPredictor(ToolModels& models, bool with_stability, bool with_probability = false)
+      : models_(models), with_stability_(with_stability), with_probability_(with_probability) {}
 
   /// @throws Error naming what a model lacks
   StepPrediction predict(const Step& step);
@@ -35,15 +39,17 @@ class StepPredictor {
  private:
   struct OfTool {
     OfTool(const MachineModel& model, const CuttingCoefficients& cutting)
-        : force(*model.tool, cutting), limits(model), walls(model) {}
+        : force(*model.tool, cutting), limits(model), risk(model, anyRisk()), walls(model) {}
     ForcePredictor force;
     StabilityLimits limits;
+    ChatterRisk risk;
     WallErrors walls;
   };
+  static stability::RiskOptions anyRisk();
   OfTool& of(int tool);
 
   ToolModels& models_;
-  bool with_stability_;
+  bool with_stability_, with_probability_;
   std::map<int, std::unique_ptr<OfTool>> tools_;
 };
 

@@ -34,6 +34,7 @@ struct BlockSummary {
   double peak_torque = NONE;               ///< [N m]
   double power = NONE;                     ///< [W] largest mean power of a step
   double margin = NONE;                    ///< [1] least stability limit over axial depth
+  double chatter = NONE;                   ///< [1] largest probability of chatter
   double wall_error = NONE;                ///< [m] of the largest magnitude
   bool rapid_hit = false;                  ///< a rapid move removes material
   bool holder_hit = false;                 ///< the holder meets material
