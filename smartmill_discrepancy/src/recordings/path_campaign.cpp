@@ -80,6 +80,26 @@ class RecordStreams {
   }
 
   std::size_t size() const { return feed_.size(); }
+  double end() const { return record_.time.back(); }  ///< [s]
+  /// [m/s] Least-squares slope of the way over the time between two stamps, which late positions change less
+  /// than the feed at one of them; 0 with fewer than three positions.
+  double meanFeed(double from, double to) const {
+    double n = 0.0, t_sum = 0.0, s_sum = 0.0, tt = 0.0, ts = 0.0, way = 0.0;
+    for (std::size_t k = 1; k < size(); ++k) {
+      if (stamp(k) < from || stamp(k) >= to) continue;
+      if (n > 0.0)
+        way += std::hypot(position_[0][k] - position_[0][k - 1], position_[1][k] - position_[1][k - 1],
+                          position_[2][k] - position_[2][k - 1]);
+      const double t = stamp(k) - from;
+      n += 1.0;
+      t_sum += t;
+      s_sum += way;
+      tt += t * t;
+      ts += t * way;
+    }
+    const double det = n * tt - t_sum * t_sum;
+    return n < 3.0 || !(det > 0.0) ? 0.0 : (n * ts - t_sum * s_sum) / det;
+  }
   CncState state(std::size_t k) const {
     CncState state;
     state.stamp = stamp(k);
@@ -166,13 +186,26 @@ void addPath(const Campaign& campaign, const CampaignTest& test, const MachineMo
         cuts->add(segment);
       });
   std::size_t followed = 0, steady_cuts = 0;
+  std::vector<CuttingCondition> conditions;
   for (std::size_t k = 0; k < streams.size(); ++k) {
-    const CncState state = streams.state(k);
-    if (const auto condition = follower.handle(state)) {
+    if (const auto condition = follower.handle(streams.state(k))) {
       steady_cuts += condition->kind == CuttingCondition::Kind::cut;
-      segments.push(*condition);
+      conditions.push_back(*condition);
     }
     followed += follower.status().follows == program::PathFollower::Follows::following;
+  }
+  auto condition = conditions.begin();
+  for (std::size_t k = 0; k < streams.size(); ++k) {
+    const CncState state = streams.state(k);
+    for (; condition != conditions.end() && condition->stamp <= state.stamp; ++condition) {
+      if (condition->kind == CuttingCondition::Kind::cut) {
+        const double end = condition + 1 == conditions.end() ? streams.end() : (condition + 1)->stamp;
+        if (const double feed = streams.meanFeed(condition->stamp, end); feed > 0.0)
+          condition->engagement.feed_per_tooth =
+              feed * units::TWO_PI / (condition->spindle_speed * condition->tool.teeth);
+      }
+      segments.push(*condition);
+    }
     segments.push(state);
     segments.push(streams.angle(k));
     segments.push(streams.forces(k));
