@@ -22,6 +22,7 @@
 #include "smartmill_program/plan/speed_planner.h"
 #include "smartmill_program/program_analysis.h"
 #include "smartmill_program/report/program_page.h"
+#include "smartmill_program/report/remarks.h"
 #include "smartmill_program/report/tables.h"
 #include "smartmill_program/stock/stock_shape.h"
 #include "smartmill_program/stock/triangle_mesh.h"
@@ -272,11 +273,14 @@ int run(const Arguments& arguments) {
   const double seconds = progress.elapsed();
 
   const std::string summary = summaryOf(result.blocks);
+  const std::vector<std::string> remarks = remarksOn(result.blocks, models);
   blockTable(result.blocks).save(arguments.out + "/blocks.csv");
   steps.csv().save(arguments.out + "/steps.csv");
-  programPage(std::filesystem::path(arguments.program).filename().string(), summary, path, result.blocks)
+  programPage(std::filesystem::path(arguments.program).filename().string(), summary, remarks, path,
+              result.blocks)
       .write(arguments.out + "/report.html");
   std::cout << summary;
+  for (const std::string& remark : remarks) std::cout << "to be changed: " << remark << "\n";
   std::fprintf(stderr, "%zu steps and %zu stability limits in %.2f s, %.0f x real time\n", result.steps,
                result.limits, seconds, result.time / seconds);
   if (result.interrupted) {

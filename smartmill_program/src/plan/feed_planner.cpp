@@ -157,19 +157,14 @@ FeedPlan FeedPlanner::plan(const AnalysedProgram& program, const AnalysedProgram
   FeedPlan plan;
   std::vector<Move> planned;
   AnalysisResult after;
-  std::map<std::size_t, double> chips;  // [m] by executed block
   for (bool holds = false; !holds && !plan.interrupted;) {
     planned = completed(&plan.text);
     std::map<int, FeedLimit> failed;
-    chips.clear();
     const auto check = [&](const Step& step, const StepPrediction& prediction) {
       const Move& move = *step.move;
       if (move.rapid || step.contact.empty()) return;
       const FeedLimit limit = exceeded(prediction, limits_);
       if (limit != FeedLimit::none) failed.emplace(move.line, limit);
-      double& chip = chips[move.block];
-      chip = std::max(chip, largestChip(*models_.of(move.tool).tool, step.contact,
-                                        prediction.feed_per_tooth * step.feed_share));
     };
     Stock copy = stock;
     after = ProgramAnalysis(name_, models_, copy, without_stability).run(planned, check, progress);
@@ -182,13 +177,12 @@ FeedPlan FeedPlanner::plan(const AnalysedProgram& program, const AnalysedProgram
     }
     holds = failed.empty();
   }
-  if (!plan.interrupted)
-    describe({program, original, {planned, after}, chips}, options.simulation.rapid, plan);
+  if (!plan.interrupted) describe(program, original, {planned, after}, options.simulation.rapid, plan);
   return plan;
 }
 
-void FeedPlanner::describe(const Described& described, double rapid, FeedPlan& plan) const {
-  const auto& [program, original, planned, chips] = described;
+void FeedPlanner::describe(const AnalysedProgram& program, const AnalysedProgram& original,
+                           const AnalysedProgram& planned, double rapid, FeedPlan& plan) const {
   plan.old_steady_time = original.analysis.time;
   plan.new_steady_time = planned.analysis.time;
   plan.lines = lines_.size();
@@ -217,9 +211,8 @@ void FeedPlanner::describe(const Described& described, double rapid, FeedPlan& p
       block.old_speed = from.spindle_speed;
       block.new_speed = to.spindle_speed;
       block.limit = lines_.at(from.line).bound.limit;
-      const auto chip = chips.find(from.block);
-      if (chip != chips.end()) block.chip = chip->second;
       const BlockSummary& summary = *new_blocks.at(from.block);
+      block.chip = summary.chip;
       block.peak_force = summary.peak_force;
       block.peak_torque = summary.peak_torque;
       block.power = summary.power;

@@ -53,27 +53,7 @@ void intersectTorque(const ForceOverFeed& force, double limit, Interval& feeds) 
   }
 }
 
-double largestPitchShare(const ToolGeometry& tool) {
-  if (tool.pitch.empty()) return 1.0;
-  return *std::max_element(tool.pitch.begin(), tool.pitch.end()) * tool.teeth / units::TWO_PI;
-}
-
-/// Largest sin(phi) sin(kappa) in a contact.
-double largestChipShare(const Contact& contact) {
-  double share = 0.0;
-  for (const EngagedArc& arc : contact.arcs) {
-    const bool crosses = arc.entry <= 0.5 * units::PI && arc.exit >= 0.5 * units::PI;
-    const double sine = crosses ? 1.0 : std::max(std::sin(arc.entry), std::sin(arc.exit));
-    share = std::max(share, sine * arc.chip_share);
-  }
-  return share;
-}
-
 }  // namespace
-
-double largestChip(const ToolGeometry& tool, const Contact& contact, double feed_per_tooth) {
-  return feed_per_tooth * largestPitchShare(tool) * largestChipShare(contact);
-}
 
 FeedBound StepBounds::of(const Move& move) const {
   FeedBound bound;

@@ -16,19 +16,51 @@ constexpr double SAME_SLOPE = 1e-4;      // [1]
 constexpr double INSIDE = 1e-9;          // [rad] of an arc, despite rounding
 constexpr double REFERENCE_FEED = 1e-4;  // [m] any: the force is affine in the feed per tooth
 
+double largestPitchShare(const ToolGeometry& tool) {
+  if (tool.pitch.empty()) return 1.0;
+  return *std::max_element(tool.pitch.begin(), tool.pitch.end()) * tool.teeth / units::TWO_PI;
+}
+
+/// Largest sin(phi) sin(kappa) in a contact.
+double largestChipShare(const Contact& contact) {
+  double share = 0.0;
+  for (const EngagedArc& arc : contact.arcs) {
+    const bool crosses = arc.entry <= 0.5 * units::PI && arc.exit >= 0.5 * units::PI;
+    const double sine = crosses ? 1.0 : std::max(std::sin(arc.entry), std::sin(arc.exit));
+    share = std::max(share, sine * arc.chip_share);
+  }
+  return share;
+}
+
 }  // namespace
 
-bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const {
-  if (contact.arcs.size() != contact_.arcs.size() || std::abs(contact.slope - contact_.slope) > SAME_SLOPE ||
-      std::abs(feed_per_tooth - feed_per_tooth_) > 1e-6 * feed_per_tooth)
-    return false;
-  for (std::size_t i = 0; i < contact.arcs.size(); ++i) {
-    const EngagedArc &a = contact.arcs[i], &b = contact_.arcs[i];
-    if (std::abs(a.entry - b.entry) > SAME_ANGLE || std::abs(a.exit - b.exit) > SAME_ANGLE ||
-        std::abs(a.bottom - b.bottom) > SAME_LENGTH || std::abs(a.top - b.top) > SAME_LENGTH)
+double largestChip(const ToolGeometry& tool, const Contact& contact, double feed_per_tooth) {
+  return feed_per_tooth * largestPitchShare(tool) * largestChipShare(contact);
+}
+
+bool sameContact(const Contact& a, const Contact& b) {
+  if (a.arcs.size() != b.arcs.size() || std::abs(a.slope - b.slope) > SAME_SLOPE) return false;
+  for (std::size_t i = 0; i < a.arcs.size(); ++i) {
+    const EngagedArc &of_a = a.arcs[i], &of_b = b.arcs[i];
+    if (std::abs(of_a.entry - of_b.entry) > SAME_ANGLE || std::abs(of_a.exit - of_b.exit) > SAME_ANGLE ||
+        std::abs(of_a.bottom - of_b.bottom) > SAME_LENGTH || std::abs(of_a.top - of_b.top) > SAME_LENGTH)
       return false;
   }
   return true;
+}
+
+bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const {
+  return std::abs(feed_per_tooth - feed_per_tooth_) <= ALIKE_FEED * feed_per_tooth && sameContact(contact, contact_);
+}
+
+std::vector<CuttingForce> ForcePredictor::series(const Contact& contact, double feed_per_tooth, double range,
+                                                 std::size_t count) const {
+  const std::vector<MechanisticForce> cuts = cutsOf(contact, feed_per_tooth);
+  std::vector<CuttingForce> forces(count);
+  for (std::size_t k = 0; k < count; ++k)
+    for (const MechanisticForce& cut : cuts)
+      forces[k].add(cut.at(range * static_cast<double>(k) / static_cast<double>(count)));
+  return forces;
 }
 
 std::vector<MechanisticForce> ForcePredictor::cutsOf(const Contact& contact, double feed_per_tooth) const {

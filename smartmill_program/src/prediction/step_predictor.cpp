@@ -28,18 +28,19 @@ StepPrediction StepPredictor::predict(const Step& step) {
   prediction.feed_per_tooth =
       units::TWO_PI * move.feed / (move.spindle_speed * models_.of(move.tool).tool->teeth);
   if (step.contact.empty()) return prediction;
-  prediction.force = tool.force.predict(step.contact, prediction.feed_per_tooth * step.feed_share);
-  prediction.power = prediction.force.mean.torque * move.spindle_speed;
-  if (with_stability_ && tool.limits.available()) {
-    const EngagementCell cell = EngagementCell::of(step.contact, step.feed_angle, move.left_hand);
-    prediction.limit = tool.limits.limit(cell, move.spindle_speed);
-    if (with_probability_)
-      prediction.chatter =
-          tool.risk.rounded(cell, move.spindle_speed, step.contact.axialDepth()).value_or(1.0);
-  }
-  if (with_stability_ && tool.walls.available() && prediction.limit > step.contact.axialDepth())
-    prediction.wall_error = tool.walls.error(step.contact, step.feed_angle, move.left_hand,
-                                             move.spindle_speed, prediction.feed_per_tooth * step.feed_share);
+  const double speed = move.spindle_speed, feed = prediction.feed_per_tooth * step.feed_share;
+  prediction.force = tool.force.predict(step.contact, feed);
+  prediction.power = prediction.force.mean.torque * speed;
+  prediction.chip = largestChip(*models_.of(move.tool).tool, step.contact, feed);
+  if (!with_stability_ || !tool.limits.available()) return prediction;
+  const EngagementCell cell = EngagementCell::of(step.contact, step.feed_angle, move.left_hand);
+  const double depth = step.contact.axialDepth();
+  prediction.limit = tool.limits.limit(cell, speed);
+  if (with_probability_) prediction.chatter = tool.risk.rounded(cell, speed, depth).value_or(1.0);
+  if (!(prediction.limit > depth)) return prediction;
+  prediction.deflection = tool.tip.largest(tool.force, step.contact, cell, speed, feed);
+  if (tool.walls.available())
+    prediction.wall_error = tool.walls.error(step.contact, step.feed_angle, move.left_hand, speed, feed);
   return prediction;
 }
 

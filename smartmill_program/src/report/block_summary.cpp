@@ -17,7 +17,12 @@ void lower(double& least, double value) {
 }  // namespace
 
 BlockSummary::BlockSummary(const Move& move)
-    : block(move.block), line(move.line), tool(move.tool), operation(move.operation) {
+    : block(move.block),
+      line(move.line),
+      tool(move.tool),
+      operation(move.operation),
+      speed(move.spindle_speed),
+      feed(move.rapid ? 0.0 : move.feed) {
 }
 
 void BlockSummary::add(const Step& step, const StepPrediction& prediction) {
@@ -43,6 +48,8 @@ void BlockSummary::add(const Step& step, const StepPrediction& prediction) {
   raise(peak_force, prediction.force.peak_force);
   raise(peak_torque, prediction.force.peak_torque);
   raise(power, prediction.power);
+  raise(chip, prediction.chip);
+  raise(deflection, prediction.deflection);
   raise(chatter, prediction.chatter);
   lower(margin, prediction.limit / step.contact.axialDepth());
   if (std::isnan(wall_error) || std::abs(prediction.wall_error) > std::abs(wall_error))

@@ -28,6 +28,8 @@ constexpr std::array<Quantity, PathView::QUANTITIES> ALL{{{"force", "peak force 
                                                           {"immersion", "immersion [deg]", false},
                                                           {"margin", "stability limit / axial depth", true},
                                                           {"chatter", "probability of chatter", false},
+                                                          {"chip", "chip thickness [mm]", false},
+                                                          {"deflection", "tip deflection [um]", false},
                                                           {"surface", "surface location error [um]", false}}};
 
 std::array<double, PathView::QUANTITIES> valuesOf(const Step& step, const StepPrediction& prediction) {
@@ -42,6 +44,8 @@ std::array<double, PathView::QUANTITIES> valuesOf(const Step& step, const StepPr
           degFromRad(step.contact.exit() - step.contact.entry()),
           std::isnan(prediction.limit) ? prediction.limit : std::min(prediction.limit / depth, MOST_MARGIN),
           prediction.chatter,
+          prediction.chip / MM,
+          prediction.deflection / units::UM,
           prediction.wall_error / units::UM};
 }
 

@@ -17,10 +17,16 @@ constexpr std::size_t MOST_ROWS =
 
 }  // namespace
 
-ReportPage programPage(const std::string& program, const std::string& summary, const PathView& path,
+ReportPage programPage(const std::string& program, const std::string& summary,
+                       const std::vector<std::string>& remarks, const PathView& path,
                        const std::vector<BlockSummary>& blocks) {
   ReportPage page(program);
   page.html() << "<pre class=\"verdict\" style=\"font-size:15px\">" << escapedHtml(summary) << "</pre>\n";
+  if (!remarks.empty()) {
+    page.html() << "<h2>What should be changed</h2>\n<ul>\n";
+    for (const std::string& remark : remarks) page.html() << "<li>" << escapedHtml(remark) << "</li>\n";
+    page.html() << "</ul>\n";
+  }
   path.write(page.html());
   page.html() << "<h2>Blocks</h2>\n";
   if (blocks.size() > MOST_ROWS)
@@ -29,7 +35,8 @@ ReportPage programPage(const std::string& program, const std::string& summary, c
   page.html()
       << "<table><tr><th>line<th>operation<th>tool<th>time [s]<th>axial depth [mm]<th>radial depth [mm]"
          "<th>entry [deg]<th>exit [deg]<th>feed per tooth [mm]<th>volume [mm3]<th>peak force [N]"
-         "<th>peak torque [N m]<th>power [W]<th>stability margin<th>air [%]</tr>\n";
+         "<th>peak torque [N m]<th>power [W]<th>chip thickness [mm]<th>tip deflection [um]<th>stability "
+         "margin<th>air [%]</tr>\n";
   const auto cell = [&](double value, const char* format) {
     page.html() << "<td>";
     if (!std::isnan(value)) page.html() << formatted(format, value);
@@ -51,6 +58,8 @@ ReportPage programPage(const std::string& program, const std::string& summary, c
     cell(b.peak_force, "%.0f");
     cell(b.peak_torque, "%.2f");
     cell(b.power, "%.0f");
+    cell(b.chip / MM, "%.4f");
+    cell(b.deflection / units::UM, "%.1f");
     cell(b.margin, "%.2f");
     cell(100.0 * b.airShare(), "%.0f");
     page.html() << "</tr>\n";

@@ -44,13 +44,14 @@ CsvWriter blockTable(const std::vector<BlockSummary>& blocks) {
       "tooth_mm,"
       "volume_mm3,face_volume_mm3,peak_force_n,peak_torque_nm,power_w,stability_margin,wall_error_um,air_"
       "share,rapid_hit,"
-      "holder_hit,chatter_probability",
+      "holder_hit,chip_mm,deflection_um,chatter_probability",
       7);
   for (const BlockSummary& b : blocks) {
     csv.row(b.block + 1, b.line, b.operation, b.tool, b.length / MM, b.time, b.axial_depth / MM,
             b.radial_depth / MM, degFromRad(b.entry), degFromRad(b.exit), b.feed_per_tooth / MM,
             b.volume / MM3, b.face_volume / MM3, b.peak_force, b.peak_torque, b.power, b.margin,
-            b.wall_error / units::UM, b.airShare(), b.rapid_hit ? 1 : 0, b.holder_hit ? 1 : 0, b.chatter);
+            b.wall_error / units::UM, b.airShare(), b.rapid_hit ? 1 : 0, b.holder_hit ? 1 : 0, b.chip / MM,
+            b.deflection / units::UM, b.chatter);
   }
   return csv;
 }
@@ -61,7 +62,8 @@ StepTable::StepTable()
           "radial_depth_mm,"
           "feed_per_tooth_mm,volume_mm3,face_volume_mm3,air,mean_fx_n,mean_fy_n,mean_fz_n,mean_torque_nm,"
           "peak_force_n,"
-          "peak_torque_nm,power_w,stability_limit_mm,chatter_probability,wall_error_um,arcs",
+          "peak_torque_nm,power_w,stability_limit_mm,chip_mm,deflection_um,chatter_probability,wall_error_um,"
+          "arcs",
           7) {
 }
 
@@ -84,6 +86,8 @@ void StepTable::add(const Step& step, const StepPrediction& prediction) {
                              force.peak_torque, prediction.power})
     csv_.cell(side ? value : none);
   csv_.cell(prediction.limit / MM)
+      .cell(prediction.chip / MM)
+      .cell(prediction.deflection / units::UM)
       .cell(prediction.chatter)
       .cell(prediction.wall_error / units::UM)
       .cell(arcsText(step.contact));
@@ -113,6 +117,8 @@ std::string summaryOf(const std::vector<BlockSummary>& blocks) {
   line("largest radial depth", b, b ? b->radial_depth / MM : 0.0, "mm");
   b = largest(blocks, &BlockSummary::feed_per_tooth);
   line("largest feed per tooth", b, b ? b->feed_per_tooth / MM : 0.0, "mm");
+  b = largest(blocks, &BlockSummary::chip);
+  line("largest chip thickness", b, b ? b->chip / MM : 0.0, "mm");
   b = largest(blocks, &BlockSummary::peak_force);
   line("largest force", b, b ? b->peak_force : 0.0, "N");
   b = largest(blocks, &BlockSummary::peak_torque);
@@ -122,6 +128,8 @@ std::string summaryOf(const std::vector<BlockSummary>& blocks) {
   b = largest(blocks, &BlockSummary::margin, true);
   line("least stability margin", b, b ? b->margin : 0.0, "");
   if (b) text += formatted("%zu blocks above the stability limit\n", unstable);
+  b = largest(blocks, &BlockSummary::deflection);
+  line("largest tip deflection", b, b ? b->deflection / units::UM : 0.0, "um");
   b = largest(blocks, &BlockSummary::chatter);
   line("probability of chatter", b, b ? b->chatter : 0.0, "");
   b = nullptr;

@@ -60,7 +60,7 @@ TEST_F(Command, WritesBlocksStepsAndPage) {
   std::vector<std::string_view> cells;
   std::vector<double> volumes;
   while (blocks.nextFilled(&cells)) {
-    ASSERT_EQ(cells.size(), 22u);
+    ASSERT_EQ(cells.size(), 24u);
     if (cells[2] == "G1") volumes.push_back(blocks.number(cells[11], "volume_mm3"));
   }
   ASSERT_EQ(volumes.size(), 2u);
@@ -156,10 +156,36 @@ TEST_F(Command, PlansSpeedsAndStatesProbabilities) {
   EXPECT_THAT(read("out"), AllOf(HasSubstr("speed of line 2 (T0): 3000 rpm before, "),
                                  HasSubstr("probability of chatter")));
   EXPECT_THAT(read("new.nc"), Not(HasSubstr("S3000")));
-  EXPECT_THAT(read("result/blocks.csv"), HasSubstr("holder_hit,chatter_probability\n"));
+  EXPECT_THAT(read("result/blocks.csv"), HasSubstr("holder_hit,chip_mm,deflection_um,chatter_probability\n"));
   EXPECT_EQ(run(text, options + "--plan-speeds-rpm 9000 4000"), 1);
   EXPECT_EQ(read("err"), "program: speeds of 9000 to 4000 rpm: expected 0 < low <= high\n");
   EXPECT_EQ(run(text, "--model mill.yaml --plan-speeds-rpm 4000 9000"), 2);  // without --plan
+}
+
+// Torque of the slot: N a R (Ktc c / pi + Kte / 2) = 4 x 3 mm x 5 mm x (800 x 0.2 / pi + 10) N/mm = 3.66 N m
+// in the mean, 230 W at 600 rpm.
+TEST_F(Command, SaysWhatShouldBeChanged) {
+  folder_.write("small.yaml",
+                std::string(MODEL) +
+                    "spindle: {viscous_nm_s_per_rad: 1e-4, coulomb_nm: 0, load_meter_v_per_w: 1e-3, "
+                    "load_meter_bandwidth_hz: 7, load_meter_resolution_v: 1e-3, max_speed_rpm: 500, "
+                    "rated_torque_nm: 3.0, rated_power_w: 200}\n"
+                    "axes: {x_travel_mm: [-250, 250], y_travel_mm: [-200, 200], z_travel_mm: [-300, 0], "
+                    "rapid_mm_per_min: 400, acceleration_mm_per_s2: 5000, home_mm: [0, 0, 0]}\n");
+  EXPECT_EQ(run("G21 G90 G0 X-10 Y20 Z-3\nS600 M3\nG1 X70 F480\nG0 X-10 Z5\nZ-3\nG1 Y21\nX70\nM30\n",
+                "--model small.yaml"),
+            0)
+      << read("err");
+  EXPECT_THAT(
+      read("out"),
+      AllOf(
+          HasSubstr("to be changed: line 3: peak torque of "),
+          HasSubstr(" N m; that of the spindle is 3 N m"),
+          HasSubstr("to be changed: line 3: cutting power of 229.7"),
+          HasSubstr(" W; that of the spindle is 200 W\n"),
+          HasSubstr("to be changed: line 3: spindle speed of 600 rpm; the highest is 500 rpm (and 1 more"),
+          HasSubstr("to be changed: line 3: feed of 480 mm/min; the rapid feed of the axes is 400 mm/min")));
+  EXPECT_THAT(read("result/report.html"), HasSubstr("<h2>What should be changed</h2>"));
 }
 
 TEST_F(Command, PlanRefusesWhatItCannotDo) {

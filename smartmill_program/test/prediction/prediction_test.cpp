@@ -1,7 +1,9 @@
 // Forces against closed forms of Altintas (Manufacturing Automation, eq. 2.27..2.29) and symmetries of the
 // limits.
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -9,6 +11,7 @@
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/prediction/tip_deflection.h"
 #include "smartmill_program/prediction/wall_errors.h"
 #include "smartmill_program/program_analysis.h"
 #include "smartmill_stability/chart/surface_error.h"
@@ -94,6 +97,61 @@ ModalModel modes(double frequency, double stiffness) {
   model.modes.back().damping_ratio = 0.03;
   model.modes.back().gain = 1.0 / stiffness;
   return model;
+}
+
+// A stiff tool follows the force: its compliance times the peak force. Four straight teeth in a slot without
+// edge forces exert a constant force, whatever the mode is: a c |K| / 2 each of two.
+TEST(TipDeflection, OfAStiffToolAndOfAConstantForce) {
+  MachineModel stiff = mill(4, 30.0);
+  stiff.tool_tip.x = stiff.tool_tip.y = modes(60000.0, 1e8);
+  const Contact contact = contactOf(60, 180, 2 * MM);
+  ForcePredictor forces(*stiff.tool, *stiff.cutting);
+  const double peak = forces.predict(contact, 0.1 * MM).peak_force;
+  TipDeflection deflection(stiff);
+  ASSERT_TRUE(deflection.available());
+  EXPECT_NEAR(deflection.largest(forces, contact, EngagementCell::of(contact, 0.0, false), SPEED, 0.1 * MM),
+              peak / 1e8, 0.02 * peak / 1e8);
+
+  MachineModel flexible = mill(4, 0.0);
+  flexible.cutting->kte = flexible.cutting->kre = 0.0;
+  flexible.tool_tip.x = flexible.tool_tip.y = modes(400.0, 2e7);  // the second harmonic of the teeth
+  const Contact slot = contactOf(0, 180, 1 * MM);
+  ForcePredictor constant(*flexible.tool, *flexible.cutting);
+  const double force = 1 * MM * 0.1 * MM * std::hypot(flexible.cutting->ktc, flexible.cutting->krc);
+  EXPECT_NEAR(
+      TipDeflection(flexible).largest(constant, slot, EngagementCell::of(slot, 0.0, false), SPEED, 0.1 * MM),
+      force / 2e7, 0.02 * force / 2e7);
+  EXPECT_FALSE(TipDeflection(mill(4)).available());
+}
+
+// The equation of motion of a mode in x, integrated in time until it is steady.
+TEST(TipDeflection, IsThatOfTheEquationOfMotion) {
+  for (const double frequency : {205.0, 430.0, 900.0}) {
+    for (const std::vector<double>& pitch :
+         {std::vector<double>{}, std::vector<double>{1.5, 1.6, 1.5, 2 * PI - 4.6}}) {
+      MachineModel model = mill(4, 20.0);
+      model.tool->pitch = pitch;
+      model.tool_tip.x = modes(frequency, 2e7);
+      const Contact contact = contactOf(90, 180, 2 * MM);
+      ForcePredictor forces(*model.tool, *model.cutting);
+      const double predicted = TipDeflection(model).largest(
+          forces, contact, EngagementCell::of(contact, 0.0, false), SPEED, 0.1 * MM);
+      const MechanisticForce force(*model.tool, *model.cutting, {0.5 * PI, PI, 2 * MM, 0.1 * MM});
+      const double w = 2 * PI * frequency, dt = 2 * PI / SPEED / 4000, damping = 2 * 0.03 * w;
+      std::vector<double> of_turn;
+      for (int i = 0; i < 4000; ++i) of_turn.push_back(force.at(2 * PI * i / 4000).fx * w * w / 2e7);
+      double x = 0.0, v = 0.0, largest = 0.0;
+      constexpr int TURNS = 60;
+      for (int i = 0; i < 4000 * TURNS; ++i) {  // midpoint rule, symplectic
+        const double pull = of_turn[static_cast<std::size_t>(i % 4000)];
+        v += 0.5 * dt * (pull - w * w * x - damping * v);
+        x += dt * v;
+        v += 0.5 * dt * (of_turn[static_cast<std::size_t>((i + 1) % 4000)] - w * w * x - damping * v);
+        if (i >= 4000 * (TURNS - 1)) largest = std::max(largest, std::abs(x));
+      }
+      EXPECT_NEAR(predicted, largest, 0.01 * largest) << frequency << (pitch.empty() ? "" : " uneven");
+    }
+  }
 }
 
 TEST(StabilityLimits, IsotropicToolHasOneLimitInAllDirections) {

@@ -85,12 +85,9 @@ class FeedPlanner {
   void choose(int line, LineFeed& feed) const;
   std::string rewritten() const;
   std::vector<Move> completed(std::string* text);
-  struct Described {
-    const AnalysedProgram &program, &original, &planned;
-    const std::map<std::size_t, double>& chips;  // [m] of the plan, by executed block
-  };
   /// Times and blocks of a plan. @param rapid [m/s]
-  void describe(const Described& described, double rapid, FeedPlan& plan) const;
+  void describe(const AnalysedProgram& program, const AnalysedProgram& original,
+                const AnalysedProgram& planned, double rapid, FeedPlan& plan) const;
   [[noreturn]] void fail(int line, const std::string& message) const;
 
   std::string name_, text_;

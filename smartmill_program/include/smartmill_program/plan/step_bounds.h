@@ -8,10 +8,6 @@
 
 namespace smartmill::program {
 
-/// The largest chip thickness [m] over a revolution: the feed of the tooth with the largest pitch times the
-/// largest sin(phi) sin(kappa) in the contact. @param feed_per_tooth [m] horizontal
-double largestChip(const ToolGeometry& tool, const Contact& contact, double feed_per_tooth);
-
 /// The largest feed at which a step holds the limits. The force of the mechanistic model is affine in the
 /// feed per tooth at each spindle angle, so that every limit is the root of a quadratic or linear equation:
 ///

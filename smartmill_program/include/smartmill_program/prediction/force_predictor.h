@@ -21,6 +21,14 @@ struct ForceOverFeed {
   CuttingForce chip;   ///< [1/m] per feed per tooth
 };
 
+/// The largest chip thickness [m] over a revolution: the feed of the tooth with the largest pitch times the
+/// largest sin(phi) sin(kappa) in the contact. @param feed_per_tooth [m] horizontal
+double largestChip(const ToolGeometry& tool, const Contact& contact, double feed_per_tooth);
+
+/// Whether two contacts are the same within the resolution of a contact.
+bool sameContact(const Contact& a, const Contact& b);
+constexpr double ALIKE_FEED = 1e-6;  ///< [1] between two feeds per tooth
+
 /// Forces of a contact by the mechanistic model (smartmill_core/cutting/mechanistic.h): the sum over its
 /// arcs, each of which is a cut of its own depth. The end face and process damping are not part of the model.
 class ForcePredictor {
@@ -31,6 +39,10 @@ class ForcePredictor {
   /// @param feed_per_tooth [m] horizontal
   /// @throws Error as MechanisticForce
   const ForcePrediction& predict(const Contact& contact, double feed_per_tooth);
+
+  /// At evenly spaced spindle angles from 0 on. @param range [rad] of the angles @param count of them
+  std::vector<CuttingForce> series(const Contact& contact, double feed_per_tooth, double range,
+                                   std::size_t count) const;
 
   /// At the spindle angles of predict().
   /// @param mean of a revolution

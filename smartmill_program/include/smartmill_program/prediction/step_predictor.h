@@ -9,6 +9,7 @@
 #include "smartmill_program/prediction/chatter_risk.h"
 #include "smartmill_program/prediction/force_predictor.h"
 #include "smartmill_program/prediction/stability_limits.h"
+#include "smartmill_program/prediction/tip_deflection.h"
 #include "smartmill_program/prediction/tool_models.h"
 #include "smartmill_program/prediction/wall_errors.h"
 
@@ -19,6 +20,8 @@ struct StepPrediction {
   double feed_per_tooth = std::numeric_limits<double>::quiet_NaN();  ///< [m] along the path
   ForcePrediction force;                                             ///< of the side of the tool
   double power = 0.0;                                                ///< [W] mean, of the cut
+  double chip = std::numeric_limits<double>::quiet_NaN();            ///< [m] largest thickness
+  double deflection = std::numeric_limits<double>::quiet_NaN();      ///< [m] of the tip, of a stable cut
   double limit = std::numeric_limits<double>::quiet_NaN();           ///< [m] stability limit
   double chatter = std::numeric_limits<double>::quiet_NaN();         ///< [1] probability of chatter
   double wall_error = std::numeric_limits<double>::quiet_NaN();      ///< [m] of a stable cut (WallErrors)
@@ -39,11 +42,12 @@ class StepPredictor {
  private:
   struct OfTool {
     OfTool(const MachineModel& model, const CuttingCoefficients& cutting)
-        : force(*model.tool, cutting), limits(model), risk(model, anyRisk()), walls(model) {}
+        : force(*model.tool, cutting), limits(model), risk(model, anyRisk()), walls(model), tip(model) {}
     ForcePredictor force;
     StabilityLimits limits;
     ChatterRisk risk;
     WallErrors walls;
+    TipDeflection tip;
   };
   static stability::RiskOptions anyRisk();
   OfTool& of(int tool);

@@ -29,6 +29,9 @@ struct BlockSummary {
   double axial_depth = NONE, radial_depth = NONE;  ///< [m] largest
   double entry = NONE, exit = NONE;        ///< [rad] of the widest engagement: least and largest angle
   double feed_per_tooth = NONE;            ///< [m] largest
+  double chip = NONE;                      ///< [m] largest thickness
+  double deflection = NONE;                ///< [m] largest of the tip, of stable steps
+  double speed = 0.0, feed = 0.0;          ///< [rad/s], [m/s] of the feed motion
   double volume = 0.0, face_volume = 0.0;  ///< [m3]
   double peak_force = NONE;                ///< [N]
   double peak_torque = NONE;               ///< [N m]

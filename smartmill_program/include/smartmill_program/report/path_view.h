@@ -18,7 +18,7 @@ const std::vector<std::string>& colourNames();
 /// the pointer reads line and value. Successive steps of a straight move with the same values are one piece.
 class PathView {
  public:
-  static constexpr std::size_t QUANTITIES = 8;
+  static constexpr std::size_t QUANTITIES = 10;
 
   /// @param colour shown first. @throws Error naming the known ones
   PathView(const StockBlock& block, const std::string& colour);

@@ -9,8 +9,9 @@
 
 namespace smartmill::program {
 
-/// The page: path, summary and the table of the blocks.
-ReportPage programPage(const std::string& program, const std::string& summary, const PathView& path,
+/// The page: summary, what should be changed, path, table of the blocks. @param remarks see remarksOn()
+ReportPage programPage(const std::string& program, const std::string& summary,
+                       const std::vector<std::string>& remarks, const PathView& path,
                        const std::vector<BlockSummary>& blocks);
 
 }  // namespace smartmill::program
