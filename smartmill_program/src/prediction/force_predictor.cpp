@@ -50,7 +50,8 @@ bool sameContact(const Contact& a, const Contact& b) {
 }
 
 bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const {
-  return std::abs(feed_per_tooth - feed_per_tooth_) <= ALIKE_FEED * feed_per_tooth && sameContact(contact, contact_);
+  return std::abs(feed_per_tooth - feed_per_tooth_) <= ALIKE_FEED * feed_per_tooth &&
+         sameContact(contact, contact_);
 }
 
 std::vector<CuttingForce> ForcePredictor::series(const Contact& contact, double feed_per_tooth, double range,
