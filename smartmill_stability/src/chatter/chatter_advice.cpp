@@ -200,7 +200,9 @@ void ChatterAdvisor::advise(const ChatterState& state) {
     if (c.name == state.condition) condition = c;
   advice.depth = condition.engagement.axial_depth;
   const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
-  std::optional<RegenerativeSystem> system = prior_system_(condition);
+  std::optional<RegenerativeSystem> system;
+  // The engagement of an unsteady cut changes: a limit for one that encloses it corrects no mode.
+  if (condition.kind != CuttingCondition::Kind::unsteady) system = prior_system_(condition);
   const double off = std::abs(actual_speed_ - condition.spindle_speed) / condition.spindle_speed;
   const double speed = off > ADVICE.load && off < ADVICE.override ? actual_speed_ : condition.spindle_speed;
   advice.speed = speed;

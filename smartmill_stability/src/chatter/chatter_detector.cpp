@@ -17,6 +17,19 @@
 #include "smartmill_stability/chatter/recording.h"
 
 namespace smartmill::stability {
+namespace {
+
+bool isUnsteady(const CuttingCondition& condition) {
+  return condition.kind == CuttingCondition::Kind::unsteady;
+}
+
+/// Thin chips alternate by runout as much as those of a flip.
+ChatterCriterionOptions withoutFlips(ChatterCriterionOptions options) {
+  options.alternation_ratio = 1.0;
+  return options;
+}
+
+}  // namespace
 
 void ChatterParameters::validate() const {
   checkBounds(*this);
@@ -33,7 +46,10 @@ ChatterCriterionOptions ChatterParameters::criterion() const {
 }
 
 ChatterDetector::ChatterDetector(const ChatterParameters& parameters, Output output)
-    : parameters_(parameters), criterion_(parameters.criterion()), output_(std::move(output)) {
+    : parameters_(parameters),
+      criterion_(parameters.criterion()),
+      unsteady_criterion_(withoutFlips(parameters.criterion())),
+      output_(std::move(output)) {
   parameters_.validate();
 }
 
@@ -77,14 +93,21 @@ void ChatterDetector::handle(const CuttingCondition& condition) {
   notSteady(condition.stamp);
 }
 
+bool ChatterDetector::isJudged(const CncState& state) const {
+  if (!condition_ || !state.connected || !(state.feed > 0.0)) return false;
+  if (isUnsteady(*condition_))
+    return parameters_.angle == "measured" && condition_->tool.teeth >= 2 && condition_->tool.pitch.empty();
+  return condition_->kind == CuttingCondition::Kind::cut &&
+         inSteadyCut(*condition_, state, parameters_.path_tolerance);
+}
+
 void ChatterDetector::handle(const CncState& state) {
   const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
   last_state_ = state.stamp;
   speed_ = state.spindle_speed;
-  const bool steady = condition_ && condition_->kind == CuttingCondition::Kind::cut && state.connected &&
-                      state.feed > 0.0 && inSteadyCut(*condition_, state, parameters_.path_tolerance);
-  if (!steady || gap) notSteady(state.stamp);
-  if (!steady) return;
+  const bool judged = isJudged(state);
+  if (!judged || gap) notSteady(state.stamp);
+  if (!judged) return;
   if (!steady_since_) steady_since_ = state.stamp;
   steady_until_ = state.stamp;
   if (feedTurns(*condition_)) notePosition(state);
@@ -296,7 +319,10 @@ void ChatterDetector::judge(double from, double to) {
   const double rate =
       static_cast<double>(samples_.size() - 1) / (samples_.back().time - samples_.front().time);
   if (!(period * rate >= 8.0)) return;  // fewer samples in a revolution do not resolve harmonics
-  const auto bins = static_cast<std::size_t>(std::ceil(period * rate));
+  const bool unsteady = isUnsteady(*condition_);
+  const std::size_t multiple = unsteady ? static_cast<std::size_t>(condition_->tool.teeth) : 1;
+  const auto bins =
+      multiple * static_cast<std::size_t>(std::ceil(period * rate / static_cast<double>(multiple)));
   std::vector<double> times;
   for (std::size_t i = 0; i < bins * turns; ++i)
     times.push_back(timeOf(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins)));
@@ -308,9 +334,10 @@ void ChatterDetector::judge(double from, double to) {
     force[0][i] = in_feed.real();
     force[1][i] = in_feed.imag();
   }
-  RevolutionWindow window(bins, turns, condition_->tool.teeth);
+  using Cut = RevolutionWindow::Cut;
+  RevolutionWindow window(bins, turns, condition_->tool.teeth, unsteady ? Cut::unsteady : Cut::steady);
   for (const std::vector<double>& axis : force) window.add(axis);
-  const ChatterEvidence evidence = criterion_.judge(window, period);
+  const ChatterEvidence evidence = (unsteady ? unsteady_criterion_ : criterion_).judge(window, period);
 
   ChatterState state;
   state.stamp = stop;

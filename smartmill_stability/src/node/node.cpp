@@ -386,7 +386,7 @@ void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper&
   } else if (last_state_.chatter) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "chatter in " + last_state_.condition);
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, last_state_.valid ? "no chatter" : "no steady cut");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, last_state_.valid ? "no chatter" : "no judged cut");
   }
   status.add("energy ratio [1]", last_state_.energy_ratio);
   status.add("severity [N]", last_state_.severity);

@@ -311,5 +311,30 @@ TEST(Advisor, withoutAPriorModelProposesSpeedsWithoutLimits) {
   EXPECT_TRUE(std::isnan(given[0].speeds[0].limit));
 }
 
+// A limit for an engagement that changes would correct a mode that is right.
+TEST(Advisor, anUnsteadyCutCorrectsNoMode) {
+  std::vector<ChatterAdvice> given;
+  ChatterAdvisor advisor(
+      100.0, 4000.0, 4,
+      [](const CuttingCondition&) { return std::optional<RegenerativeSystem>(truthAndPrior()[1]); },
+      [&](const ChatterAdvice& advice) { given.push_back(advice); });
+  CuttingCondition condition;
+  condition.kind = CuttingCondition::Kind::unsteady;
+  condition.name = "corner";
+  condition.spindle_speed = radPerSecFromRpm(13000.0);
+  condition.engagement = {1.0, units::PI, 1e-3, 0.1e-3};
+  advisor.handle(condition);
+  ChatterState state;
+  state.valid = state.chatter = true;
+  state.frequency = 800.0;
+  state.condition = "corner";
+  advisor.handle(state);
+  advisor.handle(state);
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_FALSE(given[0].correction);
+  ASSERT_FALSE(given[0].speeds.empty());
+  EXPECT_TRUE(std::isnan(given[0].speeds[0].limit));
+}
+
 }  // namespace
 }  // namespace smartmill::stability

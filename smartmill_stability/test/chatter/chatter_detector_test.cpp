@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <random>
 #include <type_traits>
 #include <vector>
 
@@ -212,6 +213,94 @@ TEST(ChatterDetector, aTurningFeedIsNoChatter) {
       }
     }
   }
+}
+
+/// Verdicts on corners of a pocket, one each second: the entry angle goes from that of a line (radial depth
+/// of 7 % of the diameter) to half immersion and back, with runout of 5 um.
+/// @param chatter [N] amplitude of 1187 Hz, 0.83 orders above a tooth passing harmonic
+std::vector<ChatterState> corners(double chatter, const ToolGeometry& stated) {
+  constexpr double RATE = 10000.0, LINE = 2.6, RUNOUT = 5e-6;
+  constexpr int STEPS = 200;  // of the engagement
+  const double speed = units::radPerSecFromRpm(4500.0);
+  ToolGeometry tool;
+  tool.teeth = 3;
+  tool.diameter = 16e-3;
+  tool.helix = 0.5;
+  const CuttingCoefficients coefficients{800e6, 250e6, 100e6, 20e3, 20e3, 1e3};
+  std::vector<MechanisticForce> cuts;
+  for (int k = 0; k <= STEPS; ++k) {
+    const double entry = LINE + (0.5 * units::PI - LINE) * k / STEPS;
+    cuts.emplace_back(tool, coefficients, Engagement{entry, units::PI, 3e-3, 0.1e-3});
+  }
+  std::vector<ChatterState> states;
+  ChatterDetector detector(ChatterParameters(), [&](const ChatterState& state) { states.push_back(state); });
+  CuttingCondition condition;
+  condition.kind = CuttingCondition::Kind::unsteady;
+  condition.name = "corner";
+  condition.tool = stated;
+  condition.steady_from = condition.steady_to = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  detector.handle(condition);
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  ForceBlock block;
+  block.sample_rate = RATE;
+  for (int k = 0; k < 30000; ++k) {
+    const double time = k / RATE, angle = speed * time;
+    const auto step = static_cast<std::size_t>(STEPS * (0.5 - 0.5 * std::cos(units::TWO_PI * time)));
+    // The chip of a tooth off centre differs by up to RUNOUT over the feed per tooth.
+    const double chip = 1.0 + RUNOUT / 0.1e-3 * std::cos(angle);
+    const CuttingForce force = cuts[step].at(angle);
+    block.force[0].push_back(chip * force.fx + chatter * std::sin(units::TWO_PI * 1187.0 * time) +
+                             noise(random));
+    block.force[1].push_back(chip * force.fy + noise(random));
+    block.force[2].push_back(chip * force.fz + noise(random));
+    if (k % 50 == 0) detector.handle(SpindleAngle{time, std::fmod(angle, units::TWO_PI), speed});
+    if (k % 200 == 0) {
+      CncState state;
+      state.stamp = time;
+      state.connected = true;
+      state.feed = 20e-3;
+      detector.handle(state);
+    }
+    if (block.force[0].size() < 100) continue;
+    detector.handle(block);
+    block.first_index += 100;
+    block.stamp = (k + 1) / RATE;
+    for (auto& axis : block.force) axis.clear();
+  }
+  return states;
+}
+
+TEST(ChatterDetector, judgesUnsteadyCuts) {
+  ToolGeometry tool;
+  tool.teeth = 3;
+  for (const double chatter : {0.0, 100.0}) {
+    int valid = 0;
+    for (const ChatterState& state : corners(chatter, tool)) {
+      if (!state.valid) continue;
+      ++valid;
+      EXPECT_EQ(state.chatter, chatter > 0.0) << state.stamp << ' ' << state.energy_ratio;
+      EXPECT_EQ(state.condition, "corner");
+      if (chatter > 0.0) {
+        EXPECT_NEAR(state.frequency, 1187.0, 1.0) << state.stamp;
+        // The noise adds 2 N at most, the forced vibration is removed to a few percent of its change.
+        EXPECT_NEAR(state.severity, 100.0 / std::sqrt(2.0), 7.0) << state.stamp;
+      }
+    }
+    EXPECT_GT(valid, 20);
+  }
+}
+
+// The forced vibration of one tooth, of an unknown number of teeth or of an uneven pitch repeats with the
+// revolution only: its change and chatter have the same frequencies.
+TEST(ChatterDetector, judgesNoUnsteadyCutOfOneToothOrAnUnevenPitch) {
+  ToolGeometry unknown, one, uneven;
+  unknown.teeth = 0;
+  one.teeth = 1;
+  uneven.teeth = 3;
+  uneven.pitch = {2.0, 2.1, units::TWO_PI - 4.1};
+  for (const ToolGeometry& tool : {unknown, one, uneven})
+    for (const ChatterState& state : corners(100.0, tool)) EXPECT_FALSE(state.valid);
 }
 
 TEST(SignalBlock, hasUpToThreeChannels) {

@@ -77,10 +77,12 @@ struct ChatterState {
 };
 
 /// Distinguishes chatter from forced vibration in the compensated force: applies ChatterCriterion to windows
-/// of whole revolutions within a steady cut. With ChatterParameters::angle none it applies judgeRecording()
-/// to the signal of the steady cut; a verdict that is unsure is not valid. Where the feed of a cut turns, the
-/// force in its frame repeats with the angle of the teeth to the feed: both are taken from the controller's
-/// positions. Inputs in stamp order; the results depend on the inputs only.
+/// of whole revolutions within a steady cut, and within an unsteady one of a tool with two or more evenly
+/// spaced teeth, where RevolutionWindow removes the change of the engagement and flips are not judged. With
+/// ChatterParameters::angle none it applies judgeRecording() to the signal of the steady cut; a verdict that
+/// is unsure is not valid. Where the feed of a cut turns, the force in its frame repeats with the angle of
+/// the teeth to the feed: both are taken from the controller's positions. Inputs in stamp order; the results
+/// depend on the inputs only.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -106,6 +108,7 @@ class ChatterDetector {
   void notePosition(const CncState& state);
   std::optional<double> turnRate(double from, double to) const;
   void dropWindow();
+  bool isJudged(const CncState& state) const;
   void notSteady(double stamp);
   void evaluate();
   double angleAt(double time) const;
@@ -117,7 +120,7 @@ class ChatterDetector {
   void judgeHarmonics(double to, double rate);
 
   ChatterParameters parameters_;
-  ChatterCriterion criterion_;
+  ChatterCriterion criterion_, unsteady_criterion_;
   Output output_;
   std::optional<CuttingCondition> condition_;
   std::deque<Sample> samples_;

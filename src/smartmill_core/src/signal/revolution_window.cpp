@@ -7,12 +7,34 @@
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/window.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill {
+namespace {
 
-RevolutionWindow::RevolutionWindow(std::size_t bins, std::size_t turns, int teeth)
+/// Removes the slow change of a signal that repeats with a period: at each place of the period a cosine
+/// series over the periods, without its mean. @param period [samples] a divisor of the length @param terms of
+/// the series; the fastest makes half of them in cycles along the signal
+void removeSlowChange(std::vector<double>& signal, std::size_t period, std::size_t terms) {
+  const std::size_t periods = signal.size() / period;
+  const auto count = static_cast<double>(periods);
+  std::vector<double> wave(periods);
+  for (std::size_t term = 1; term <= terms; ++term) {
+    for (std::size_t k = 0; k < periods; ++k)
+      wave[k] = std::cos(units::PI * static_cast<double>(term) * (static_cast<double>(k) + 0.5) / count);
+    std::vector<double> amplitude(period, 0.0);
+    for (std::size_t i = 0; i < signal.size(); ++i)
+      amplitude[i % period] += 2.0 / count * wave[i / period] * signal[i];
+    for (std::size_t i = 0; i < signal.size(); ++i) signal[i] -= wave[i / period] * amplitude[i % period];
+  }
+}
+
+}  // namespace
+
+RevolutionWindow::RevolutionWindow(std::size_t bins, std::size_t turns, int teeth, Cut cut)
     : bins_(bins),
       turns_(turns),
+      cut_(cut),
       half_(teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0),
       teeth_(teeth),
       remainder_of_turn_(turns, 0.0),
@@ -34,6 +56,13 @@ void RevolutionWindow::add(std::vector<double> channel) {
   for (std::size_t i = 0; i < channel.size(); ++i) {
     total_ += (channel[i] - mean) * (channel[i] - mean) / n;
     channel[i] -= repeated[i % bins_];
+  }
+  if (cut_ == Cut::unsteady) {
+    constexpr std::size_t WHOLE_CYCLE = 2;
+    removeSlowChange(channel, bins_, WHOLE_CYCLE);
+    removeSlowChange(channel, bins_ / static_cast<std::size_t>(teeth_), turns_);
+  }
+  for (std::size_t i = 0; i < channel.size(); ++i) {
     remainder_ += share * channel[i] * channel[i] / n;
     remainder_of_turn_[i / bins_] += share * channel[i] * channel[i] / static_cast<double>(bins_);
     channel[i] *= taper_[i];

@@ -8,11 +8,20 @@ namespace smartmill {
 /// Energies of a window of whole spindle revolutions, sampled in even steps of the spindle angle and summed
 /// over the channels. The synchronous part (teeth, runout) is the mean over the revolutions at each angle;
 /// the remainder is chatter, noise or a tone of another machine.
+///
+/// In an unsteady cut the forced vibration changes with the engagement: lines next to the harmonics. What
+/// changes there is part of the forced vibration and not of the remainder (cyclostationary signal, Antoni
+/// 2009): at each angle of a tooth passing period all changes of up to half a cycle in a revolution, and at
+/// each angle of a revolution, for teeth that differ, those of up to one cycle in the window. A vibration
+/// within half a spindle frequency of a tooth passing harmonic, or within a line of a spindle harmonic,
+/// therefore does not show in the remainder.
 class RevolutionWindow {
  public:
+  enum class Cut { steady, unsteady };
+
   /// @param bins samples in a revolution @param turns revolutions, 2 or more @param teeth of the tool; 0:
-  /// unknown
-  RevolutionWindow(std::size_t bins, std::size_t turns, int teeth);
+  /// unknown. In an unsteady cut two or more, evenly spaced, and a divisor of bins.
+  RevolutionWindow(std::size_t bins, std::size_t turns, int teeth, Cut cut = Cut::steady);
 
   /// @param channel bins x turns samples
   void add(std::vector<double> channel);
@@ -44,7 +53,9 @@ class RevolutionWindow {
  private:
   void addOrders(const std::vector<double>& repeated);
 
-  std::size_t bins_, turns_, half_;
+  std::size_t bins_, turns_;
+  Cut cut_;
+  std::size_t half_;
   int teeth_;
   double total_ = 0.0, remainder_ = 0.0, alternating_ = 0.0, unequal_ = 0.0;
   std::vector<double> remainder_of_turn_, taper_, of_order_, power_;
