@@ -113,12 +113,13 @@ void PanelNode::listen() {
         if (message.name != condition_)
           for (Digests& digests : digests_) digests.revolution->reset();
         condition_ = message.name;
-        if (message.kind != smartmill_msgs::CuttingCondition::CUT) steady_ = false;
+        cut_ = message.kind == smartmill_msgs::CuttingCondition::CUT;
+        if (!cut_) steady_ = false;
         teeth_ = message.teeth;
       });
   shell_.inputs().on<smartmill_msgs::ChatterState>(
       names::CHATTER_STATE,
-      [this](const smartmill_msgs::ChatterState& message, double) { steady_ = message.valid; });
+      [this](const smartmill_msgs::ChatterState& message, double) { steady_ = cut_ && message.valid; });
   listen(names::FORCE_MEASURED, StripMessage::MEASURED);
   listen(names::FORCE_COMPENSATED, StripMessage::COMPENSATED);
   listen(names::TWIN_FORCE, StripMessage::TWIN);

@@ -53,7 +53,7 @@ class PanelNode {
   AngleTrack angle_;
   std::string condition_;
   std::uint32_t teeth_ = 0;
-  bool steady_ = false;
+  bool cut_ = false, steady_ = false;  // the condition is a steady cut; and the chatter detection judges it
   std::array<Digests, 3> digests_;
   ros::Publisher strip_, revolution_, spectrum_;
   PanelLog log_;
