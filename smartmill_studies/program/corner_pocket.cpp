@@ -16,7 +16,6 @@ using units::PI;
 
 constexpr int MOST_TRIES = 10000;
 constexpr double LINE_MARGIN = 1.25, LEAST_DEPTH = 0.8 * MM, MOST_CORNER_DEPTH = 6.0 * MM;
-constexpr double CORNER_TIME = 1.0;  // [s] of constant engagement on the arc, at least
 
 /// Arc of contact of the corner: the wall before is about the same centre.
 double entryOnArc(const CornerPocket& pocket, double tool_radius) {
@@ -75,7 +74,7 @@ double limitOf(program::StabilityLimits& limits, double entry, double speed, dou
 
 }  // namespace
 
-CornerCase drawCornerCase(const MachineModel& base, std::mt19937_64& random) {
+CornerCase drawCornerCase(const MachineModel& base, std::mt19937_64& random, const CornerRanges& ranges) {
   const Draw uniform{random};
   for (int attempt = 0; attempt < MOST_TRIES; ++attempt) {
     CornerCase drawn{drawMachine(base, uniform), {}};
@@ -85,10 +84,10 @@ CornerCase drawCornerCase(const MachineModel& base, std::mt19937_64& random) {
     pocket.radius = uniform(8.0, 12.0) * MM;
     pocket.speed = units::radPerSecFromRpm(std::round(uniform(3000.0, 6000.0)));
     pocket.feed = uniform(0.03, 0.07) * MM;
-    pocket.corner_margin = uniform(0.5, 0.8);
+    pocket.corner_margin = uniform(ranges.low_margin, ranges.high_margin);
     const double velocity = pocket.feed * drawn.machine.tool->teeth * pocket.speed / units::TWO_PI;
     const double way = constantWay(pocket, radius);
-    if (way / velocity < CORNER_TIME) continue;
+    if (way / velocity < ranges.least_time || way / velocity > ranges.most_time) continue;
     program::StabilityLimits limits(drawn.machine);
     pocket.depth =
         limitOf(limits, entryOnArc(pocket, radius), pocket.speed, way / pocket.radius) / pocket.corner_margin;

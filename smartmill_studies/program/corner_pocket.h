@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <random>
 #include <string>
 
@@ -24,6 +25,13 @@ struct CornerPocket {
   static constexpr double SIDE = 60e-3;  ///< [m] of the block
 };
 
+/// What is drawn.
+struct CornerRanges {
+  double low_margin = 0.5, high_margin = 0.8;                                    ///< [1] of the corner
+  double least_time = 1.0, most_time = std::numeric_limits<double>::infinity();  ///< [s] of constant
+                                                                                 ///< engagement on the arc
+};
+
 /// A machine and a pocket whose corner is unstable, with a margin of 0.5 to 0.8, while lines and roughing
 /// have a margin of at least 1.25: modes of the tool tip, coefficients, tool, geometry and speed are drawn
 /// until they fulfil this, and the engagement is constant for a second on the arc. The workpiece is the
@@ -32,7 +40,7 @@ struct CornerCase {
   MachineModel machine;
   CornerPocket pocket;
 };
-CornerCase drawCornerCase(const MachineModel& base, std::mt19937_64& random);
+CornerCase drawCornerCase(const MachineModel& base, std::mt19937_64& random, const CornerRanges& ranges = {});
 
 /// In the dialect of a control with a program number; line numbers are those of CornerLines.
 std::string cornerProgram(const CornerPocket& pocket, const MachineModel& machine);

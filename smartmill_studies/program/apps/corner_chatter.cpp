@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -66,10 +67,11 @@ nlohmann::json lineOf(const Arguments& a, int number) {
   const Predicted predicted = predict(text, file, drawn.machine);
 
   std::map<std::string, Verdicts> verdicts;
-  std::string first;  // that chatters
+  std::set<std::string> unsteady;  // conditions, which are not of one block: program_unsteady_chatter
+  std::string first;               // that chatters
   stability::DetectionPipeline detection(stability::ChatterParameters(), HOLD_BACK,
                                          [&](const stability::ChatterState& state) {
-                                           if (!state.valid) return;
+                                           if (!state.valid || unsteady.count(state.condition) > 0) return;
                                            Verdicts& of = verdicts[state.condition];
                                            ++of.windows;
                                            of.chatter += state.chatter;
@@ -79,7 +81,10 @@ nlohmann::json lineOf(const Arguments& a, int number) {
                                          });
   PartStreams streams;
   streams.state = [&](const CncState& state) { detection.push(state); };
-  streams.condition = [&](const CuttingCondition& condition) { detection.push(condition); };
+  streams.condition = [&](const CuttingCondition& condition) {
+    if (condition.kind == CuttingCondition::Kind::unsteady) unsteady.insert(condition.name);
+    detection.push(condition);
+  };
   streams.sensors = [&](const sim::World::Block& block) {
     for (const SpindleAngle& angle : block.angle) detection.push(angle);
     detection.push(block.dynamometer);
