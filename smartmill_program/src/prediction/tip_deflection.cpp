@@ -40,29 +40,30 @@ double TipDeflection::largest(ForcePredictor& forces, const Contact& contact, co
       static_cast<std::size_t>(std::clamp(std::ceil(BAND * highest / base), least, std::max(MOST, least)));
   const std::vector<CuttingForce> series =
       forces.series(contact, feed_per_tooth, units::TWO_PI / order, OVERSAMPLING * harmonics);
-  const auto count = static_cast<double>(series.size());
-  std::vector<Complex> x(series.size(), 0.0), y(series.size(), 0.0);
+  const std::size_t count = series.size();
+  std::vector<double> cosine(count), sine(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const double turn = units::TWO_PI * static_cast<double>(k) / static_cast<double>(count);
+    cosine[k] = std::cos(turn);
+    sine[k] = std::sin(turn);
+  }
+  std::vector<double> x(count, 0.0), y(count, 0.0);
   for (std::size_t n = 0; n <= harmonics; ++n) {
     Complex fx = 0.0, fy = 0.0;
-    for (std::size_t k = 0; k < series.size(); ++k) {
-      const Complex turn =
-          std::polar(1.0 / count, -units::TWO_PI * static_cast<double>((n * k) % series.size()) / count);
-      fx += series[k].fx * turn;
-      fy += series[k].fy * turn;
+    const double share = (n == 0 ? 1.0 : 2.0) / static_cast<double>(count);  // and the negative frequency
+    for (std::size_t k = 0, at = 0; k < count; ++k, at = (at + n) % count) {
+      fx += Complex(series[k].fx * cosine[at], -series[k].fx * sine[at]);
+      fy += Complex(series[k].fy * cosine[at], -series[k].fy * sine[at]);
     }
     const auto g = stability::receptance(system.modes, static_cast<double>(n) * base);
-    const double both = n == 0 ? 1.0 : 2.0;  // and the negative frequency
-    const Complex u = both * (g[0] * fx + g[1] * fy), v = both * (g[2] * fx + g[3] * fy);
-    for (std::size_t k = 0; k < series.size(); ++k) {
-      const Complex turn =
-          std::polar(1.0, units::TWO_PI * static_cast<double>((n * k) % series.size()) / count);
-      x[k] += u * turn;
-      y[k] += v * turn;
+    const Complex u = share * (g[0] * fx + g[1] * fy), v = share * (g[2] * fx + g[3] * fy);
+    for (std::size_t k = 0, at = 0; k < count; ++k, at = (at + n) % count) {
+      x[k] += u.real() * cosine[at] - u.imag() * sine[at];
+      y[k] += v.real() * cosine[at] - v.imag() * sine[at];
     }
   }
   largest_ = 0.0;
-  for (std::size_t k = 0; k < series.size(); ++k)
-    largest_ = std::max(largest_, std::hypot(x[k].real(), y[k].real()));
+  for (std::size_t k = 0; k < count; ++k) largest_ = std::max(largest_, std::hypot(x[k], y[k]));
   return largest_;
 }
 
