@@ -52,6 +52,17 @@ std::string withoutSemicolon(const std::string& line) {
   return line;
 }
 
+std::string commentIn(const std::string& line) {
+  const std::size_t begin = line.find_first_of("(;");
+  if (begin == std::string::npos) return {};
+  const std::size_t end = line[begin] == '(' ? line.find(')', begin) : std::string::npos;
+  const std::string text = line.substr(begin + 1, end == std::string::npos ? end : end - begin - 1);
+  constexpr const char* BLANKS = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(BLANKS);
+  return first == std::string::npos ? std::string()
+                                    : text.substr(first, text.find_last_not_of(BLANKS) - first + 1);
+}
+
 void refuse(const Word& word, const std::string& message) {
   throw Error("column " + std::to_string(word.column) + ": " + message);
 }
@@ -59,7 +70,7 @@ void refuse(const Word& word, const std::string& message) {
 Block::Block(const std::string& line, const nc::Variables& variables) {
   nc::BlockReader reader(withoutSemicolon(line), MACRO_DIALECT, variables);
   while (const std::optional<Word> word = reader.next()) {
-    empty_ = false;
+    ++count_;
     if (word->value) add(*word);
   }
 }

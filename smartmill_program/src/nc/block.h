@@ -36,6 +36,9 @@ inline constexpr nc::Dialect MACRO_DIALECT{"O:NGXYZIJKRPQLHDTFSM", std::string_v
 /// Without the comment of LinuxCNC that begins with ';' (on a Fanuc control ';' is the end of the block).
 std::string withoutSemicolon(const std::string& line);
 
+/// Text of the first comment of a line, without blanks around it; empty: there is none.
+std::string commentIn(const std::string& line);
+
 /// @throws Error "column C: message"
 [[noreturn]] void refuse(const nc::Word& word, const std::string& message);
 
@@ -46,7 +49,9 @@ class Block {
   /// @throws Error on an unknown word, and on two words of one address or codes of one group.
   explicit Block(const std::string& line, const nc::Variables& variables = {});
 
-  bool empty() const { return empty_; }
+  bool empty() const { return count_ == 0; }
+  /// Whether it has no word but N.
+  bool hasOnlyNumber() const { return count_ == 0 || (count_ == 1 && has('N')); }
   /// The code of a group, as its word.
   const std::optional<nc::Word>& code(Group group) const { return codes_[static_cast<std::size_t>(group)]; }
   const std::vector<nc::Word>& functions() const { return functions_; }  ///< M
@@ -69,7 +74,7 @@ class Block {
   std::array<std::optional<nc::Word>, 27> words_;
   std::array<bool, 27> taken_{};
   std::vector<nc::Word> functions_;
-  bool empty_ = true;
+  std::size_t count_ = 0;  // of words
 };
 
 /// O or : number of a line that begins a program or subprogram. @throws Error

@@ -335,6 +335,7 @@ void Interpreter::add(const PathSegment& path, bool rapid, double feed, double d
   move.line = line_;
   move.sequence = sequence_;
   move.operation = operation_;
+  move.name = name_;
   move.path = rotated(path);
   move.rapid = rapid;
   move.feed = feed;

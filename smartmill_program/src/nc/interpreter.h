@@ -24,6 +24,8 @@ class Interpreter {
   /// @throws Error "column C: ..."
   void execute(Block& block, std::size_t number, int line);
   bool ended() const { return ended_; }  ///< by M2 or M30
+  /// Of the following blocks.
+  void setName(const std::string& name) { name_ = std::make_shared<const std::string>(name); }
 
  private:
   using Point = nc::PathSegment::Point;
@@ -70,6 +72,7 @@ class Interpreter {
   std::size_t number_ = 0;
   int line_ = 0;
   std::string operation_;
+  std::shared_ptr<const std::string> name_;
   std::optional<nc::Word> motion_word_;
 
   // modal

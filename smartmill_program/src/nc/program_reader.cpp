@@ -56,6 +56,9 @@ class ProgramRun {
     const std::size_t here = at_++;
     const bool macro = statement.kind != MacroStatement::Kind::none;
     Block block(macro ? std::string() : text_.line(here), [this](int n) { return variables_.value(n); });
+    if (!macro && block.hasOnlyNumber()) {
+      if (const std::string name = commentIn(text_.line(here)); !name.empty()) interpreter_.setName(name);
+    }
     if (block.empty() && !macro) return;
     if (!started_) begin_ = main_ = here;
     started_ = true;

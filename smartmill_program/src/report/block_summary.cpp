@@ -21,6 +21,7 @@ BlockSummary::BlockSummary(const Move& move)
       line(move.line),
       tool(move.tool),
       operation(move.operation),
+      name(move.name),
       speed(move.spindle_speed),
       feed(move.rapid ? 0.0 : move.feed) {
 }

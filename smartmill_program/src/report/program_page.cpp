@@ -33,7 +33,8 @@ ReportPage programPage(const std::string& program, const std::string& summary,
     page.html() << "<p>The first " << MOST_ROWS << " of " << blocks.size()
                 << " blocks; all are in blocks.csv.</p>\n";
   page.html()
-      << "<table><tr><th>line<th>operation<th>tool<th>time [s]<th>axial depth [mm]<th>radial depth [mm]"
+      << "<table><tr><th>line<th>name<th>operation<th>tool<th>time [s]<th>axial depth [mm]<th>radial depth "
+         "[mm]"
          "<th>entry [deg]<th>exit [deg]<th>feed per tooth [mm]<th>volume [mm3]<th>peak force [N]"
          "<th>peak torque [N m]<th>power [W]<th>chip thickness [mm]<th>tip deflection [um]<th>stability "
          "margin<th>air [%]</tr>\n";
@@ -43,7 +44,8 @@ ReportPage programPage(const std::string& program, const std::string& summary,
   };
   for (std::size_t i = 0; i < std::min(blocks.size(), MOST_ROWS); ++i) {
     const BlockSummary& b = blocks[i];
-    page.html() << "<tr><td>" << b.line << "<td>" << escapedHtml(b.operation)
+    page.html() << "<tr><td>" << b.line << "<td>" << (b.name ? escapedHtml(*b.name) : "") << "<td>"
+                << escapedHtml(b.operation)
                 << (b.rapid_hit    ? " hits the stock"
                     : b.holder_hit ? " holder hits the stock"
                                    : "")

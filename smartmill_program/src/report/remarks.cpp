@@ -18,7 +18,7 @@ class Remark {
 
   void add(const BlockSummary& block, bool beyond, const Text& text) {
     if (!beyond) return;
-    if (count_++ == 0) text_ = formatted("line %d: ", block.line) + text(block);
+    if (count_++ == 0) text_ = formatted("line %d (%s): ", block.line, block.label().c_str()) + text(block);
   }
   void writeTo(std::vector<std::string>& remarks) const {
     if (count_ == 0) return;

@@ -44,14 +44,14 @@ CsvWriter blockTable(const std::vector<BlockSummary>& blocks) {
       "tooth_mm,"
       "volume_mm3,face_volume_mm3,peak_force_n,peak_torque_nm,power_w,stability_margin,wall_error_um,air_"
       "share,rapid_hit,"
-      "holder_hit,chip_mm,deflection_um,chatter_probability",
+      "holder_hit,chip_mm,deflection_um,chatter_probability,name",
       7);
   for (const BlockSummary& b : blocks) {
     csv.row(b.block + 1, b.line, b.operation, b.tool, b.length / MM, b.time, b.axial_depth / MM,
             b.radial_depth / MM, degFromRad(b.entry), degFromRad(b.exit), b.feed_per_tooth / MM,
             b.volume / MM3, b.face_volume / MM3, b.peak_force, b.peak_torque, b.power, b.margin,
             b.wall_error / units::UM, b.airShare(), b.rapid_hit ? 1 : 0, b.holder_hit ? 1 : 0, b.chip / MM,
-            b.deflection / units::UM, b.chatter);
+            b.deflection / units::UM, b.chatter, b.name ? *b.name : "");
   }
   return csv;
 }
@@ -109,7 +109,7 @@ std::string summaryOf(const std::vector<BlockSummary>& blocks) {
   const auto line = [&](const char* what, const BlockSummary* block, double value, const char* unit) {
     if (block)
       text += formatted("%-24s %10.4g %-4s line %d (%s)\n", what, value, unit, block->line,
-                        block->operation.c_str());
+                        block->label().c_str());
   };
   const BlockSummary* b = largest(blocks, &BlockSummary::axial_depth);
   line("largest axial depth", b, b ? b->axial_depth / MM : 0.0, "mm");

@@ -60,7 +60,7 @@ TEST_F(Command, WritesBlocksStepsAndPage) {
   std::vector<std::string_view> cells;
   std::vector<double> volumes;
   while (blocks.nextFilled(&cells)) {
-    ASSERT_EQ(cells.size(), 24u);
+    ASSERT_EQ(cells.size(), 25u);
     if (cells[2] == "G1") volumes.push_back(blocks.number(cells[11], "volume_mm3"));
   }
   ASSERT_EQ(volumes.size(), 2u);
@@ -156,7 +156,8 @@ TEST_F(Command, PlansSpeedsAndStatesProbabilities) {
   EXPECT_THAT(read("out"), AllOf(HasSubstr("speed of line 2 (T0): 3000 rpm before, "),
                                  HasSubstr("probability of chatter")));
   EXPECT_THAT(read("new.nc"), Not(HasSubstr("S3000")));
-  EXPECT_THAT(read("result/blocks.csv"), HasSubstr("holder_hit,chip_mm,deflection_um,chatter_probability\n"));
+  EXPECT_THAT(read("result/blocks.csv"),
+              HasSubstr("holder_hit,chip_mm,deflection_um,chatter_probability,name\n"));
   EXPECT_EQ(run(text, options + "--plan-speeds-rpm 9000 4000"), 1);
   EXPECT_EQ(read("err"), "program: speeds of 9000 to 4000 rpm: expected 0 < low <= high\n");
   EXPECT_EQ(run(text, "--model mill.yaml --plan-speeds-rpm 4000 9000"), 2);  // without --plan
@@ -178,13 +179,14 @@ TEST_F(Command, SaysWhatShouldBeChanged) {
       << read("err");
   EXPECT_THAT(
       read("out"),
-      AllOf(
-          HasSubstr("to be changed: line 3: peak torque of "),
-          HasSubstr(" N m; that of the spindle is 3 N m"),
-          HasSubstr("to be changed: line 3: cutting power of 229.7"),
-          HasSubstr(" W; that of the spindle is 200 W\n"),
-          HasSubstr("to be changed: line 3: spindle speed of 600 rpm; the highest is 500 rpm (and 1 more"),
-          HasSubstr("to be changed: line 3: feed of 480 mm/min; the rapid feed of the axes is 400 mm/min")));
+      AllOf(HasSubstr("to be changed: line 3 (G1): peak torque of "),
+            HasSubstr(" N m; that of the spindle is 3 N m"),
+            HasSubstr("to be changed: line 3 (G1): cutting power of 229.7"),
+            HasSubstr(" W; that of the spindle is 200 W\n"),
+            HasSubstr(
+                "to be changed: line 3 (G1): spindle speed of 600 rpm; the highest is 500 rpm (and 1 more"),
+            HasSubstr(
+                "to be changed: line 3 (G1): feed of 480 mm/min; the rapid feed of the axes is 400 mm/min")));
   EXPECT_THAT(read("result/report.html"), HasSubstr("<h2>What should be changed</h2>"));
 }
 

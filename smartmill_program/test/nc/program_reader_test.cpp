@@ -53,6 +53,25 @@ TEST(ProgramReader, LinesWithModalState) {
 
 // Half circle about (10, 0): by I and J, and by R; seen from +z clockwise it passes y > 0 when it starts at x
 // = 0.
+// A comment in a line of its own, with or without N; one behind words names nothing.
+TEST(ProgramReader, CommentsAreNames) {
+  const std::vector<Move> moves = movesOf(
+      "G21 G90 G0 X0 Y0 Z5\nS3000 M3 F600\nG1 X1\n( rough, level 1 )\nG1 X2 (fast)\nX3\nN10 "
+      "(finish)\n()\nX4\n; last\n"
+      "X5\nM30\n");
+  const auto nameAt = [&](double x) -> std::string {
+    for (const Move& move : moves)
+      if (std::abs(move.path.target()[0] - x * MM) < 1e-9 && !move.rapid)
+        return move.name ? *move.name : "none";
+    return "no move";
+  };
+  EXPECT_EQ(nameAt(1), "none");
+  EXPECT_EQ(nameAt(2), "rough, level 1");
+  EXPECT_EQ(nameAt(3), "rough, level 1");
+  EXPECT_EQ(nameAt(4), "finish");
+  EXPECT_EQ(nameAt(5), "last");
+}
+
 TEST(ProgramReader, ArcsByCentreAndByRadius) {
   for (const std::string arc : {"G2 X20 Y0 I10 J0 F100", "G2 X20 Y0 R10 F100", "G2 X20 I10 F100"}) {
     const auto moves = movesOf(START + arc + "\nM30\n");

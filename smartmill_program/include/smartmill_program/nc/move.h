@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <string>
 
 #include "smartmill_core/nc/path_segment.h"
@@ -25,6 +26,8 @@ struct Move {
   int line = 0;           ///< in the file, from 1
   int sequence = 0;       ///< last N word until the block, which a control displays; 0: none so far
   std::string operation;  ///< "G0" ... "G3", "G81" ..., "G4"
+  /// Last comment in a line of its own before the block, as the name of what follows; nullptr: none so far.
+  std::shared_ptr<const std::string> name;
   nc::PathSegment path{nc::PathSegment::Point{{0, 0, 0}}};
   bool rapid = false;
   double feed = 0.0;           ///< [m/s] along the path; unused where rapid

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct BlockSummary {
   std::size_t block = 0;  ///< in the order of execution, from 0
   int line = 0, tool = 0;
   std::string operation;
+  std::shared_ptr<const std::string> name;         ///< see Move
   double length = 0.0;                             ///< [m]
   double time = 0.0, cut_time = 0.0;               ///< [s] of all, of the steps that remove material
   double feed_time = 0.0;                          ///< [s] of feed motion
@@ -42,6 +44,8 @@ struct BlockSummary {
   bool rapid_hit = false;                  ///< a rapid move removes material
   bool holder_hit = false;                 ///< the holder meets material
 
+  /// "G1" or "G1, NAME"
+  std::string label() const { return name ? operation + ", " + *name : operation; }
   /// [1] Share of the feed motion's time without removal; NaN without feed motion.
   double airShare() const { return feed_time > 0.0 ? 1.0 - cut_time / feed_time : NONE; }
 };
