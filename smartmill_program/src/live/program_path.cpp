@@ -70,8 +70,11 @@ std::vector<ProgramPath::Place> ProgramPath::near(const Point& point, double fro
   std::vector<Place> places;
   for (std::size_t m = firstMove(from); m < moves_.size() && begin_[m] <= to; ++m) {
     const PathSegment& path = moves_[m].path;
-    const double along =
-        nearestOn(path, point, std::max(0.0, from - begin_[m]), std::min(path.length(), to - begin_[m]));
+    // By rounding the part may begin behind the end of the first move.
+    const double low = std::clamp(from - begin_[m], 0.0, path.length());
+    const double high = std::min(path.length(), to - begin_[m]);
+    if (low > high) continue;
+    const double along = nearestOn(path, point, low, high);
     const double deviation = distanceBetween(point, path.at(along));
     if (deviation > tolerance) continue;
     const Place place{begin_[m] + along, deviation, m};
