@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/streams.h"
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
@@ -93,9 +94,15 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
     }
   }
   clock_.addArrival(next_ + block.samples.size() - 1, arrival);
-  for (const ServoSample& sample : block.samples) {
+  const bool load_is_valid = arrival - load_stamp_ <= options_.load_timeout;
+  for (ServoSample sample : block.samples) {
     const std::uint64_t number = next_++;
     ++statistics_.samples;
+    if (!load_is_valid) {
+      sample.spindle_load = NOT_A_NUMBER;
+      ++statistics_.without_load;
+    }
+    latest_ = sample;
     if (!clock_.settled()) {
       continue;
     }
@@ -109,7 +116,6 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
       segments.push_back(std::exchange(segment_, {}));
     }
   }
-  latest_ = block.samples.back();
   return segments;
 }
 
@@ -129,8 +135,9 @@ std::uint64_t ServoStream::count() const {
   return statistics_.samples;
 }
 
-void ServoStream::setLoad(double spindle_load) {
+void ServoStream::setLoad(double stamp, double spindle_load) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  load_stamp_ = stamp;
   load_ = spindle_load;
 }
 

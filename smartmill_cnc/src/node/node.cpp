@@ -34,6 +34,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double LOAD_TIMEOUT = 0.1;   // [s] of a load meter outside the controller: two periods of 20 Hz
 constexpr double HOLDER_PERIOD = 1.0;  // [s] between two checks of the client that armed motion
 
 double steadySeconds() {
@@ -41,8 +42,10 @@ double steadySeconds() {
 }
 
 std::shared_ptr<linuxcnc::ServoStream> makeStream(const NodeParameters& parameters) {
-  return parameters.kind == "linuxcnc" ? std::make_shared<linuxcnc::ServoStream>(parameters.linuxcnc.folder)
-                                       : nullptr;
+  if (parameters.kind != "linuxcnc") return nullptr;
+  linuxcnc::ServoStreamOptions options;
+  if (!parameters.load_input.empty()) options.load_timeout = LOAD_TIMEOUT;
+  return std::make_shared<linuxcnc::ServoStream>(parameters.linuxcnc.folder, options);
 }
 
 std::unique_ptr<Controller> makeController(const NodeParameters& parameters,

@@ -31,7 +31,7 @@ ServoPublisher::ServoPublisher(ros::NodeHandle nh, NodeShell& shell,
   if (!load_input.empty()) {
     shell.inputs().on<smartmill_msgs::LoadSample>(load_input, [this](const auto& load, double) {
       if (std::isfinite(load.spindle_load)) {
-        stream_->setLoad(load.spindle_load);
+        stream_->setLoad(load.header.stamp.toSec(), load.spindle_load);
       }
     });
   }
@@ -84,15 +84,20 @@ void ServoPublisher::diagnose(diagnostic_updater::DiagnosticStatusWrapper& statu
   using Level = diagnostic_msgs::DiagnosticStatus;
   const linuxcnc::ServoStatistics statistics = stream_->statistics();
   const std::uint64_t before = std::exchange(reported_samples_, statistics.samples);
+  const std::uint64_t late_loads =
+      statistics.without_load - std::exchange(reported_without_load_, statistics.without_load);
   if (before == statistics.samples) {
     status.summary(Level::ERROR, "silent");
   } else if (statistics.lost > 0) {
     status.summary(Level::WARN, "samples were lost");
+  } else if (late_loads > 0) {
+    status.summary(Level::WARN, "the load meter is late: load not known");
   } else {
     status.summary(Level::OK, "all servo cycles received");
   }
   status.add("samples [1]", std::to_string(statistics.samples));
   status.add("lost [1]", std::to_string(statistics.lost));
+  status.add("samples without load [1]", std::to_string(statistics.without_load));
   status.add("restarts of the controller [1]", std::to_string(statistics.restarts));
   status.addf("late, median [ms]", "%.1f", 1e3 * statistics.late_median);
   status.addf("late, 99 % [ms]", "%.1f", 1e3 * statistics.late_99);

@@ -30,7 +30,7 @@ class ServoPublisher {
 
   std::shared_ptr<linuxcnc::ServoStream> stream_;
   ros::Publisher servo_, angle_;
-  std::uint64_t reported_samples_ = 0;  // samples at the last diagnostics
+  std::uint64_t reported_samples_ = 0, reported_without_load_ = 0;  // at the last diagnostics
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

@@ -110,6 +110,44 @@ TEST(ServoStream, RestartOfTheControllerIsNoLoss) {
   EXPECT_EQ(stream.statistics().restarts, 1u);
 }
 
+// A computer that stands still for 1.3 s: the controller catches up in a burst of cycles that contain the
+// load from before, then the load meter delivers what it measured in between.
+TEST(ServoStream, ALateLoadIsNotKnown) {
+  ServoStreamOptions options;
+  options.load_timeout = 0.1;
+  ServoStream stream("/nowhere", options);
+  std::uint32_t next = 0;
+  double now = 50.0;
+  // Whether the load of the last of some samples is known.
+  const auto known = [&](std::uint32_t count) {
+    ServoBlock block = blockOf(next, count);
+    for (ServoSample& sample : block.samples) sample.spindle_load = 0.4;
+    next += count;
+    stream.addBlock(block, now);
+    return std::isfinite(stream.latest()->spindle_load);
+  };
+  for (int i = 0; i < 100; ++i) {
+    now += 0.01;
+    stream.setLoad(now - 0.02, 0.4);
+    EXPECT_TRUE(known(10));
+  }
+  EXPECT_EQ(stream.statistics().without_load, 0u);
+  now += 1.3;
+  EXPECT_FALSE(known(1300));
+  stream.setLoad(now - 0.5, 0.4);
+  EXPECT_FALSE(known(10));
+  stream.setLoad(now - 0.09, 0.4);
+  EXPECT_TRUE(known(10));
+  EXPECT_EQ(stream.statistics().without_load, 1310u);
+}
+
+TEST(ServoStream, TheLoadOfADriveIsAlwaysKnown) {
+  ServoStream stream("/nowhere");
+  stream.addBlock(blockOf(0, 10), 50.0);
+  EXPECT_EQ(stream.latest()->spindle_load, 0.0);
+  EXPECT_EQ(stream.statistics().without_load, 0u);
+}
+
 TEST(SilenceTimer, PausesOfTheObserverDoNotCount) {
   SilenceTimer timer;
   double now = 10.0;

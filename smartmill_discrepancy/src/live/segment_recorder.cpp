@@ -202,7 +202,8 @@ void SegmentRecorder::finish() {
     segment.tool = condition_->tool;
     segment.record = recordOf(segment.test.name, *rotation);
     for (const LoadSample& l : loads_) {
-      if (l.stamp >= begin && l.stamp <= end) segment.load.push_back({l.stamp - begin, l.spindle_load});
+      if (l.stamp >= begin && l.stamp <= end && std::isfinite(l.spindle_load))
+        segment.load.push_back({l.stamp - begin, l.spindle_load});
     }
     unconfirmed_.push_back(std::move(segment));
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <string>
+#include <utility>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
@@ -21,6 +22,7 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
+constexpr Index RIGID_LINES = 12;        // above 0 Hz: 60 Hz of records of 0.2 s
 constexpr double MIN_RANK_RATIO = 1e-6;  // [1] smallest over largest singular value of the directions tapped
 
 /// Force and moment of a unit hit (eq. 2.2, 2.6), moments over the lever.
@@ -232,6 +234,33 @@ Eigen::VectorXd varianceAt(const std::vector<LineFit>& lines, std::size_t at, co
   return before.cwiseMax(squares / static_cast<double>(to - from) / static_cast<double>(free));
 }
 
+/// Adds the line at 0 Hz: the real parts of the first lines above it, where the response of a body on springs
+/// is G + a f^2, extrapolated. The taps do not give it: the mean of a record is known only as well as the
+/// mean of the few samples before the hit.
+void addLineAtRest(TransferMatrix& matrix) {
+  MatrixXd terms(RIGID_LINES, 2);
+  for (Index l = 0; l < RIGID_LINES; ++l) terms.row(l) << 1.0, std::pow(static_cast<double>(l + 1), 2);
+  const Eigen::VectorXd weights =
+      terms * linear::inverseSymmetric(MatrixXd(terms.transpose() * terms)).col(0);
+  const auto sum = [&weights](const auto& lines, const auto& part) {
+    auto result = part(lines[0], weights(0));
+    for (Index l = 1; l < RIGID_LINES; ++l) result += part(lines[static_cast<std::size_t>(l)], weights(l));
+    return result;
+  };
+  const auto value = [](const MatrixXcd& line, double weight) -> MatrixXcd {
+    return weight * line.real().cast<Complex>();
+  };
+  const auto half_variance = [](const MatrixXd& std_dev, double weight) -> MatrixXd {
+    return 0.5 * weight * weight * std_dev.cwiseAbs2();
+  };
+  const auto put = [](auto& lines, auto line) { lines.insert(lines.begin(), std::move(line)); };
+  put(matrix.forward, sum(matrix.forward, value));
+  put(matrix.inverse, sum(matrix.inverse, value));
+  put(matrix.forward_std, MatrixXd(sum(matrix.forward_std, half_variance).cwiseSqrt()));
+  put(matrix.inverse_std, MatrixXd(sum(matrix.inverse_std, half_variance).cwiseSqrt()));
+  put(matrix.condition, matrix.condition.front());
+}
+
 }  // namespace
 
 TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double sample_rate) {
@@ -252,8 +281,8 @@ TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double
   const TapSpectra spectra = spectraOf(taps, scale);
 
   // First the residuals of all lines, then the standard deviations.
-  std::vector<LineFit> lines;
-  for (std::size_t l = 0; l < result.frequency.size(); ++l)
+  std::vector<LineFit> lines;  // without that at 0 Hz
+  for (std::size_t l = 1; l < result.frequency.size(); ++l)
     lines.push_back(fitLine(spectra.applied(unit_hits, l), spectra.measuredAt(l)));
   const Eigen::VectorXd before = spectra.noise.rowwise().mean();
   for (std::size_t l = 0; l < lines.size(); ++l) {
@@ -266,6 +295,7 @@ TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double
     result.forward_std.push_back(scaledBy(scale, std_dev[0]));
     result.inverse_std.push_back(scaledBy(scale, std_dev[1]));
   }
+  addLineAtRest(result);
   return result;
 }
 

@@ -26,7 +26,7 @@ struct CalibrationParameters {
   std::vector<double> points_z{-0.03, -0.025, 0.03, -0.03, 0.025, 0.03,
                                0.03,  -0.025, 0.03, 0.03,  0.025, 0.03};
   std::vector<double> reference_points{0.045, 0.0, 0.02, 0.0, -0.04, 0.02, 0.0, 0.0, 0.03};
-  int point_hits = 12;
+  int point_hits = 4;
   double operator_timeout = 600.0;
 
   ForceSensorKind kind() const { return forceSensorKind(sensor); }

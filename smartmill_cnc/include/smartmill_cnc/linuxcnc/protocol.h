@@ -86,7 +86,7 @@ struct ServoSample {
   double spindle_speed = 0.0;        ///< [rad/s]
   double velocity = 0.0;             ///< [m/s] along the path
   double distance_to_go = 0.0;       ///< [m] of the move
-  double spindle_load = 0.0;         ///< [1] of full scale, from the drive or its replacement (SetLoad)
+  double spindle_load = 0.0;         ///< [1] of full scale, from the drive or SetLoad; NaN: not known
   double marker = 0.0;               ///< line of the program's move (M67 E0)
   double tool = 0.0;                 ///< T of the tool in the spindle; 0: none
 };

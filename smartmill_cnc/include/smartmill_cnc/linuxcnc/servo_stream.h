@@ -46,6 +46,7 @@ class ServoClock {
 /// Statistics of the received samples.
 struct ServoStatistics {
   std::uint64_t samples = 0, lost = 0, restarts = 0;
+  std::uint64_t without_load = 0;                             ///< samples whose load was too old
   double late_median = 0.0, late_99 = 0.0, late_worst = 0.0;  ///< [s] delay of the arrival
 };
 
@@ -60,6 +61,9 @@ struct ServoStreamOptions {
   std::size_t segment_length = 10;     ///< [samples] of 1 ms: 100 messages a second
   double retry_period = 0.2;           ///< [s] between two attempts to connect
   std::uint64_t restart_gap = 60'000;  ///< [samples] a larger gap is a restart of the controller: a minute
+  /// [s] age of the last value of setLoad() up to which the load of a sample is valid, else it is NaN;
+  /// infinite: the drive itself writes the load
+  double load_timeout = std::numeric_limits<double>::infinity();
 };
 
 /// Every servo cycle of the controller, from linuxcnc_stream. One thread calls step(); the const functions
@@ -77,7 +81,9 @@ class ServoStream {
 
   std::optional<ServoSample> latest() const;  ///< empty before the first
   std::uint64_t count() const;                ///< [1] received samples
-  void setLoad(double spindle_load);
+  /// Value of a load meter outside the controller. @param stamp [s] of its measurement @param spindle_load
+  /// [1]
+  void setLoad(double stamp, double spindle_load);
   ServoStatistics statistics() const;
 
  private:
@@ -99,7 +105,8 @@ class ServoStream {
   ServoStatistics statistics_;
   std::array<std::uint64_t, LATE_BINS> late_{};
   std::optional<ServoSample> latest_;
-  std::optional<double> load_;
+  std::optional<double> load_;  // to be sent
+  double load_stamp_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace smartmill::cnc::linuxcnc

@@ -43,7 +43,9 @@ struct TransferMatrix {
 /// Bachrathy and Stepan eq. 2.2..2.7: with force n F and moment r x n F of every tap in E and the measured
 /// channels in M, forward = M E^+ and inverse = E M^+ over all hits, line by line. Standard deviations come
 /// from the noise in M: its variance per channel and line is the residual variance of the hits (smoothed over
-/// neighbouring lines), at least that before the hits. Hammer windowed (Dunwoody eq. 4.17..4.19).
+/// neighbouring lines), at least that before the hits. Hammer windowed (Dunwoody eq. 4.17..4.19). The
+/// taps do not give the line at 0 Hz (the level before each hit is subtracted): extrapolated from those
+/// above.
 /// @param sample_rate [Hz] @throws Error when taps differ in length, are fewer than the channels, or do not
 /// span all directions (with six channels also moments about all axes).
 TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double sample_rate);
