@@ -36,6 +36,17 @@ TEST(AxesTrack, InterpolatesLinearlyBetweenSamples) {
   EXPECT_NEAR(*track.newest(), 10.010, 1e-12);
 }
 
+TEST(AxesTrack, MovesAtTheTimeOfASampleAsWell) {
+  AxesTrack track;
+  track.push(block(10.0, 11));
+  for (const int k : {0, 3, 9}) {
+    const SampleBlock b = block(10.0, 11);
+    const MotionState state = track.at(b.timeOf(static_cast<std::size_t>(k)));
+    EXPECT_NEAR(state.spindle_speed, units::TWO_PI * 100.0, 1e-5) << k;
+    EXPECT_NEAR(state.velocity[0], 0.02, 1e-9) << k;
+  }
+}
+
 TEST(AxesTrack, TakesTheToolWhereItIsStated) {
   AxesTrack track;
   track.push(block(10.0, 2));

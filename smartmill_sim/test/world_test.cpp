@@ -535,6 +535,42 @@ TEST(World, AMicrophoneHearsTheSpindle) {
   EXPECT_NEAR(square, expected, 0.02 * expected);  // 4 sigma of the noise's contribution: 25,600 samples
 }
 
+// An external controller whose spindle stops in the cut from one sample to the next, between two updates of
+// the contact.
+TEST(World, ASpindleThatStopsInTheCutRaisesAnAlarm) {
+  World world(millThatCuts(), {});
+  std::vector<MotionState> states(World::BLOCK);
+  MotionState state;
+  state.position = {-0.06, 0.0, -1e-3};
+  state.velocity = {0.04, 0.0, 0.0};
+  state.spindle_speed = units::radPerSecFromRpm(6000.0);
+  World::Block block;
+  double largest = 0.0;
+  const auto advance = [&](std::size_t turning) {
+    largest = 0.0;
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      if (i >= turning) state.spindle_speed = 0.0;
+      state.position[0] += state.velocity[0] / World::SAMPLE_RATE;
+      state.spindle_angle =
+          std::fmod(state.spindle_angle + state.spindle_speed / World::SAMPLE_RATE, units::TWO_PI);
+      states[i] = state;
+    }
+    world.advance(block, states);
+    for (const double f : block.force.force[1]) largest = std::max(largest, std::abs(f));
+  };
+  for (int k = 0; k < 200; ++k) advance(World::BLOCK);
+  ASSERT_GT(largest, 20.0);
+  EXPECT_EQ(world.controller().calls().state.status().alarm, 0);
+  advance(101);
+  EXPECT_EQ(world.controller().calls().state.status().alarm, 1);
+  advance(0);
+  EXPECT_EQ(largest, 0.0);
+  // It turns again.
+  state.spindle_speed = units::radPerSecFromRpm(6000.0);
+  advance(World::BLOCK);
+  EXPECT_GT(largest, 20.0);
+}
+
 TEST(World, CuttingWithTheSpindleAtRestIsRefused) {
   Machine machine(millThatCuts());
   machine.program("G90\nG0 X-60\nG1 F6000 Z-1\nG1 F2400 X40\n");

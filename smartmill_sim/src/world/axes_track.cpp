@@ -47,7 +47,7 @@ MotionState AxesTrack::at(double time) {
   state.position = a.position;
   state.tool = a.tool;
   double revolutions = a.revolutions;
-  if (points_.size() > 1 && !points_[1].jump && time > a.time) {
+  if (points_.size() > 1 && !points_[1].jump && time >= a.time) {
     const Point& b = points_[1];
     const double rate = 1.0 / (b.time - a.time), passed = time - a.time;
     for (std::size_t k = 0; k < 3; ++k) {

@@ -223,7 +223,8 @@ void World::simulateBlock(Block& block, const std::vector<MotionState>& states) 
   torque_ = 0.0;
   for (std::size_t i = 0; i < BLOCK; ++i) {
     if (states[i].tool != last_.tool) changeTool(states[i].tool);
-    if ((index_ + i) % options_.contact_update == 0) updateContact(states[i]);
+    const bool stopped = tool_->machine.cutting() && !(states[i].spindle_speed > 0.0);
+    if ((index_ + i) % options_.contact_update == 0 || stopped) updateContact(states[i]);
     simulateSample(static_cast<double>(index_ + i) / SAMPLE_RATE, states[i], block);
     last_ = states[i];
   }
@@ -239,7 +240,9 @@ void World::simulateBlock(Block& block, const std::vector<MotionState>& states) 
 
 void World::updateContact(const MotionState& state) {
   if (!stock_) return;
-  const StockContact::Fault fault = stock_->update(state, between(state, 0.0), tool_->machine);
+  ToolMotion now = between(state, 0.0);
+  now.speed = state.spindle_speed;  // as its velocity: the spindle may have been at rest before
+  const StockContact::Fault fault = stock_->update(state, now, tool_->machine);
   if (fault.alarm != 0) raiseAlarm(fault.alarm, fault.text);
 }
 
