@@ -201,6 +201,14 @@ function(smartmill_run_alone name)
   endif()
 endfunction()
 
+# smartmill_start_early(NAME): a long gtest of this package that starts before shorter ones, as a processor would be idle
+# at the end of all tests otherwise.
+function(smartmill_start_early name)
+  if(TARGET ${PROJECT_NAME}_${name})
+    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${PROJECT_NAME}_${name} PROPERTIES COST 100)
+  endif()
+endfunction()
+
 # smartmill_rostest(LAUNCH_FILE NAME SOURCES a.cpp ... LIBRARIES x ... NODES t ...): a gtest node run by rostest.
 # NODES are targets that the launch file starts.
 function(smartmill_rostest launch name)
