@@ -1,9 +1,7 @@
 // rosrun smartmill_launch discover: sends a goal to the action `discover` of the running machine and prints
 // its result.
 
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -19,6 +17,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/stop_signal.h"
 
 namespace {
 
@@ -28,13 +27,7 @@ using Result = smartmill_msgs::DiscoverResult;
 using Feedback = smartmill_msgs::DiscoverFeedback;
 using Json = nlohmann::ordered_json;
 
-constexpr int INTERRUPTED = 130;      // exit status
 constexpr double CANCEL_WAIT = 30.0;  // [s] until the machine is safe
-
-std::atomic<bool> stop{false};
-void onSignal(int) {
-  stop = true;
-}
 
 struct Request {
   std::string out;
@@ -90,7 +83,7 @@ class DiscoverClient {
         arm(true);
         return;
       } catch (const Error&) {
-        if (stop || ros::SteadyTime::now() > end) throw;
+        if (stopRequested() || ros::SteadyTime::now() > end) throw;
         ros::WallDuration(0.5).sleep();
       }
     }
@@ -103,7 +96,7 @@ class DiscoverClient {
     goal.install = request_.install;
     client_.sendGoal(goal, {}, {}, [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { print(*f); });
     bool ended = false;
-    while (!ended && !stop && (ros::SteadyTime::now() - begin_).toSec() < request_.timeout)
+    while (!ended && !stopRequested() && (ros::SteadyTime::now() - begin_).toSec() < request_.timeout)
       ended = client_.waitForResult(ros::Duration(0.1));
     if (!ended) {
       client_.cancelGoal();
@@ -134,15 +127,14 @@ int run(const Request& request) {
   for (const std::string& test : result.tests) std::printf("discover: suggested test: %s\n", test.c_str());
   std::fflush(stdout);
   if (!request.out.empty()) write(result, request.out);
-  return stop ? INTERRUPTED : result.code == Result::OK ? 0 : 1;
+  return stopRequested() ? INTERRUPTED : result.code == Result::OK ? 0 : 1;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "discover_client", ros::init_options::NoSigintHandler);
-  std::signal(SIGINT, onSignal);
-  std::signal(SIGTERM, onSignal);
+  smartmill::catchStopSignals();
   Request request;
   smartmill::CommandLine line{
       "Makes the running machine identify why it differs from its model (action discover)."};

@@ -20,8 +20,8 @@
 #include "controller_link.h"
 #include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
-#include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/stop_signal.h"
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
@@ -161,9 +161,9 @@ int main(int argc, char** argv) {
   smartmill::CommandLine line{"Gateway to the LinuxCNC of a folder with its mill.nml (docs/linuxcnc.md)."};
   line.option("folder", folder, "folder of the machine; gateway.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&] {
-    catchStopSignals();
+    smartmill::catchStopSignals();
     Gateway gateway(folder);
-    while (!stopRequested()) {
+    while (!smartmill::stopRequested()) {
       gateway.step();
     }
     gateway.stopAll();

@@ -19,9 +19,9 @@
 #include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
 #include "smartmill_cnc/linuxcnc/silence_timer.h"
-#include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc::linuxcnc {
@@ -295,7 +295,7 @@ int main(int argc, char** argv) {
       "it ends."};
   line.option("folder", folder, "folder of the machine; stream.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&]() -> int {
-    catchStopSignals();
+    smartmill::catchStopSignals();
     rtapi_set_msg_level(RTAPI_MSG_NONE);
     Server server(folder);
     const std::unique_ptr<Component> component = server.component();

@@ -2,24 +2,18 @@
 
 #include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <string>
 #include <thread>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_focas/recording.h"
 
 namespace {
 
 using namespace smartmill;
-
-volatile std::sig_atomic_t stop_requested = 0;
-
-void requestStop(int) {
-  stop_requested = 1;
-}
 
 struct Arguments {
   std::string host, file = "session.focas";
@@ -44,8 +38,7 @@ void run(const Arguments& a) {
     std::printf("%s\n", focas::describe(frame).c_str());
     std::fflush(stdout);
   };
-  std::signal(SIGINT, requestStop);
-  std::signal(SIGTERM, requestStop);
+  catchStopSignals();
   const focas::Tap tap(static_cast<std::uint16_t>(a.listen_port), a.host, static_cast<std::uint16_t>(a.port),
                        a.timeout, record);
   if (a.listen_port == 0) {
@@ -60,7 +53,7 @@ void run(const Arguments& a) {
       throw Error(replied ? why : controller + " does not answer as a controller: " + why);
     }
   }
-  while (a.listen_port != 0 && stop_requested == 0) {
+  while (a.listen_port != 0 && !stopRequested()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   out.flush();

@@ -1,4 +1,3 @@
-#include <csignal>
 #include <cstdio>
 #include <string>
 
@@ -6,20 +5,14 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_focas/client.h"
 
 namespace {
 
 using namespace smartmill;
 
-constexpr int INTERRUPTED = 130;       // exit status
 constexpr std::size_t LARGE = 100000;  // [byte] from which on progress is displayed
-
-volatile std::sig_atomic_t stop_requested = 0;
-
-void requestStop(int) {
-  stop_requested = 1;
-}
 
 struct Arguments {
   std::string host, file;
@@ -28,8 +21,7 @@ struct Arguments {
 };
 
 int run(const Arguments& a) {
-  std::signal(SIGINT, requestStop);
-  std::signal(SIGTERM, requestStop);
+  catchStopSignals();
   std::string text;
   int number = a.number;
   try {
@@ -44,7 +36,7 @@ int run(const Arguments& a) {
     text = client.upload(number, [&](std::size_t size) {
       shown = size >= LARGE;
       if (shown) std::fprintf(stderr, "\r%zu kB", size / 1000);
-      return stop_requested == 0;
+      return !stopRequested();
     });
     if (shown) std::fprintf(stderr, "\n");
     client.close();
@@ -53,7 +45,7 @@ int run(const Arguments& a) {
       throw Error(formatted("%s: O%04d is not in the memory of the controller", a.host.c_str(), number));
     throw Error(error.what());
   }
-  if (stop_requested != 0) {
+  if (stopRequested()) {
     std::fprintf(stderr, "interrupted; %s has not been written\n", a.file.c_str());
     return INTERRUPTED;
   }

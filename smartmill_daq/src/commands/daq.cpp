@@ -1,10 +1,10 @@
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
 
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_daq/acquisition/acquisition.h"
 #include "smartmill_daq/acquisition/state_text.h"
 #include "smartmill_daq/commands.h"
@@ -15,12 +15,6 @@ namespace {
 
 constexpr int DEVICE_FAULT = 3;  // exit code
 constexpr double PERIOD = 1.0;   // [s] between reports
-
-volatile std::sig_atomic_t stop_requested = 0;
-
-void requestStop(int) {
-  stop_requested = 1;
-}
 
 struct Arguments {
   std::string config, record;
@@ -61,10 +55,10 @@ int run(const Arguments& arguments) {
                  static_cast<unsigned long long>(fault.index), fault.text.c_str());
   };
   Acquisition acquisition(instrument, makeDriver(arguments.config, instrument, options), outputs, wallTime);
-  std::signal(SIGINT, requestStop);
+  catchStopSignals();
   const double begin = wallTime();
   double reported = begin;
-  while (stop_requested == 0 && acquisition.step()) {
+  while (!stopRequested() && acquisition.step()) {
     const double now = wallTime();
     if (now - reported >= PERIOD) {
       report(acquisition, now - begin);

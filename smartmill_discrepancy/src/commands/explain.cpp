@@ -1,8 +1,6 @@
 #include "smartmill_discrepancy/commands.h"
 
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -10,10 +8,9 @@
 #include <optional>
 #include <string>
 
-#include <unistd.h>
-
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/inspection_file.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_discrepancy/explain/explain.h"
 #include "smartmill_discrepancy/recordings/bag_campaign.h"
 #include "smartmill_discrepancy/recordings/path_campaign.h"
@@ -26,20 +23,6 @@ namespace {
 
 using namespace smartmill;
 using namespace smartmill::discrepancy;
-
-constexpr int INTERRUPTED = 130;  // exit status
-
-std::atomic<bool> interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-// The first Ctrl-C ends the search and keeps its result, the second ends the program.
-void interrupt(int) {
-  constexpr char HEARD[] =
-      "cancelled: the effects found so far are validated and written (again: end at once)\n";
-  [[maybe_unused]] const auto written = write(STDERR_FILENO, HEARD, sizeof(HEARD) - 1);
-  interrupted = true;
-  std::signal(SIGINT, SIG_DFL);
-}
 
 struct Arguments {
   std::string campaign, model, prior, inspection, out;
@@ -69,7 +52,7 @@ int run(const Arguments& arguments) {
   ExplainOptions options;
   options.bench.threads = arguments.threads;
   if (!arguments.prior.empty()) options.search.prior = readCauseOdds(arguments.prior);
-  options.bench.cancelled = [] { return interrupted.load(); };
+  options.bench.cancelled = stopRequested;
   const auto elapsed = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   };
@@ -88,7 +71,7 @@ int run(const Arguments& arguments) {
       campaign, readMachineModel(arguments.model.empty() ? campaign.modelPath() : arguments.model));
   std::optional<InspectionFile> inspection;
   if (!arguments.inspection.empty()) inspection = readInspectionFile(arguments.inspection);
-  std::signal(SIGINT, interrupt);
+  catchInterrupt("cancelled: the effects found so far are validated and written (again: end at once)\n");
   Explanation explanation = explain(data, options, arguments.out);
   if (inspection) {
     explanation.inspection = checkInspection(*inspection, campaign.tests, data.nominal, explanation.model);

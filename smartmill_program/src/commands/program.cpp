@@ -2,7 +2,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -13,6 +12,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/text_file.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/commands.h"
 #include "smartmill_program/nc/linuxcnc_program.h"
@@ -34,16 +34,7 @@ using namespace smartmill::program;
 using Clock = std::chrono::steady_clock;
 using units::MM;
 
-constexpr int INTERRUPTED = 130;  // exit status
-constexpr double QUIET = 1.0;     // [s] after which progress is displayed, and between its lines
-
-volatile std::sig_atomic_t stop_requested = 0;
-
-// The first Ctrl-C ends the simulation and keeps its result, the second ends the program.
-void requestStop(int) {
-  stop_requested = 1;
-  std::signal(SIGINT, SIG_DFL);
-}
+constexpr double QUIET = 1.0;  // [s] after which progress is displayed, and between its lines
 
 struct Arguments {
   std::string program, out, stl, colour = "force";
@@ -148,7 +139,7 @@ class ProgressLine {
       std::fprintf(stderr, "\r%3.0f %% of the moves", 100.0 * share);
       open_ = true;
     }
-    return stop_requested == 0;
+    return !stopRequested();
   }
   void close() {
     if (open_) std::fprintf(stderr, "\n");
@@ -208,7 +199,7 @@ int writePlanWithSpeeds(const PlanJob& job, SpeedPlanner& planner, const Analyse
   const Arguments& arguments = job.arguments;
   ProgressLine progress;
   const std::vector<PlannedSpeed> speeds = planner.plan([&](double share) { return progress(share); });
-  if (stop_requested != 0) {
+  if (stopRequested()) {
     progress.close();
     return notWritten(arguments);
   }
@@ -256,7 +247,7 @@ int run(const Arguments& arguments) {
   StepTable steps;
   PathView path(stock.block(), arguments.colour);
   ProgressLine progress;
-  std::signal(SIGINT, requestStop);
+  catchInterrupt();
   const AnalysisResult result = analysis.run(
       moves,
       [&](const Step& step, const StepPrediction& prediction) {

@@ -1,7 +1,6 @@
 #include "smartmill_sim/commands.h"
 
 #include <chrono>
-#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <map>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_focas/server.h"
 #include "smartmill_sim/controller/controller.h"
 
@@ -30,16 +30,10 @@ struct Arguments {
   const double most_behind = 0.5;  // [s] after a longer pause of the computer the elapsed time is skipped
 };
 
-volatile std::sig_atomic_t stop_requested = 0;
-
-void requestStop(int) {
-  stop_requested = 1;
-}
-
 void run(const Arguments& a, sim::Controller& controller) {
   std::vector<sim::MotionState> states;
   Clock::time_point done = Clock::now();
-  while (stop_requested == 0) {
+  while (!stopRequested()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
     const Clock::time_point now = Clock::now();
     if (std::chrono::duration<double>(now - done).count() > a.most_behind) {
@@ -52,8 +46,7 @@ void run(const Arguments& a, sim::Controller& controller) {
 }
 
 void run(const Arguments& a) {
-  std::signal(SIGINT, requestStop);
-  std::signal(SIGTERM, requestStop);
+  catchStopSignals();
   sim::ControllerOptions options =
       sim::ControllerOptions::ofModel(a.model.empty() ? MachineModel{} : readMachineModel(a.model));
   options.mode = MODES.at(a.mode);
