@@ -190,7 +190,9 @@ TEST(ChatterRisk, IsThatOfTheLogNormalCoefficient) {
     const double scatter = std::sqrt(expected * (1.0 - expected) / options.draws);
     const double depth = limit * std::exp(0.1 * deviations);
     EXPECT_NEAR(*risk.probability(slot, speed, depth), expected, 3.0 * scatter + 0.03) << deviations;
-    if (deviations != 0.0) EXPECT_EQ(risk.meanIsStable(slot, speed, depth), deviations < 0.0);
+    if (deviations != 0.0) {
+      EXPECT_EQ(risk.meanIsStable(slot, speed, depth), deviations < 0.0);
+    }
   }
   EXPECT_EQ(risk.rounded(slot, speed, 0.2 * limit), 0.0);
   EXPECT_EQ(risk.rounded(slot, speed, 5.0 * limit), 1.0);

@@ -70,7 +70,7 @@ Campaign producedCampaign(const MachineModel& machine, const MachineModel& nomin
   test.kind = TestKind::path;
   test.file = "part.csv";
   test.sample_rate = recorder.sampleRate();
-  test.program = PathProgram{"pocket.nc", {}, {}};
+  test.program = PathProgram{"pocket.nc", false, {}, {}};
   writeText(campaign.inFolder(test.program->file), text);
   writeCsv(recorder.record(*nominal.spindle->load_meter_full_scale, begin, end), campaign.pathOf(test));
   campaign.tests = {test};
