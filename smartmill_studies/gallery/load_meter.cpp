@@ -11,6 +11,7 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
+#include "smartmill_core/math/running_line.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/machine_calibration.h"
@@ -186,7 +187,7 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
   std::normal_distribution<double> normal(0.0, NOISE);
   for (int i = 0; i < 2000; ++i) drive.step(TORQUE, SPEED);
   Rows rows;
-  double n = 0.0, st = 0.0, sy = 0.0, stt = 0.0, sty = 0.0;
+  RunningLine decay;
   for (int i = 0; i < 400; ++i) {
     const double t = i / RATE, torque = t < LEAVES ? TORQUE : 0.0;
     const double v = drive.rounded(drive.step(torque, SPEED) + normal(random));
@@ -194,10 +195,9 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
     rows.push_back({t, torque, estimated});
     // The logarithm of a first-order decay is a line.
     if (t < LEAVES + 0.002 || estimated < 0.1 * TORQUE) continue;
-    const double y = std::log(estimated / TORQUE), at = t - LEAVES;
-    n += 1.0, st += at, sy += y, stt += at * at, sty += at * y;
+    decay.add(t - LEAVES, std::log(estimated / TORQUE));
   }
-  const double bandwidth = -(n * sty - st * sy) / (n * stt - st * st) / units::TWO_PI;
+  const double bandwidth = -decay.slope() / units::TWO_PI;
   const std::string png = folder + "/dunwoody_3_3.png";
   Gnuplot plot(png, 900, 450, 12);
   plot.block("torque", rows);
@@ -212,24 +212,13 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
                          0.0, 0.05, "the machine has a lag of 7 Hz; here from its step response")}};
 }
 
-/// Straight line, least squares.
-struct Straight {
-  double slope, level;
-};
-Straight straight(const std::vector<double>& x, const std::vector<double>& y) {
-  const double n = static_cast<double>(x.size()), mx = mean(x), my = mean(y);
-  double xy = -n * mx * my, xx = -n * mx * mx;
-  for (std::size_t i = 0; i < x.size(); ++i) xy += x[i] * y[i], xx += x[i] * x[i];
-  return {xy / xx, my - xy / xx * mx};
-}
-
 Drawn coefficients(const std::string& folder, unsigned seed) {
   // Eq. 3.22, 3.23: the machine cuts with the coefficients from the dynamometer.
   constexpr double KTC = 936e6, KTE = 13.9e3, RADIUS = 10e-3, DEPTH = 3e-3, RPM = 5000.0;
   constexpr int TEETH = 2;
   Meter meter(seed);
   const Idle idle = idleOf(meter);
-  std::vector<double> feeds, estimated, truth;
+  RunningLine line;  // [N m] over [m]
   Rows points;
   const double w = units::radPerSecFromRpm(RPM);
   for (double feed = 4e-5; feed < 2.1e-4; feed += 2e-5) {
@@ -237,14 +226,12 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
                                            {0.0, units::PI, DEPTH, feed})
                               .mean()
                               .torque;
-    feeds.push_back(feed);
-    truth.push_back(torque);
-    estimated.push_back((meter.mean(torque, w) - idle.fit.at(w)) / (K * w));  // eq. 3.5
-    points.push_back({1e3 * feed, torque, estimated.back()});
+    const double estimated = (meter.mean(torque, w) - idle.fit.at(w)) / (K * w);  // eq. 3.5
+    points.push_back({1e3 * feed, torque, estimated});
+    line.add(feed, estimated);
   }
-  const Straight line = straight(feeds, estimated);
   const double scale = RADIUS * TEETH * DEPTH;  // eq. 3.19
-  const double ktc = line.slope * units::PI / scale, kte = line.level * 2.0 / scale;
+  const double ktc = line.slope() * units::PI / scale, kte = line.level() * 2.0 / scale;
   const std::string png = folder + "/dunwoody_3_5.png";
   Gnuplot plot(png, 900, 500, 12);
   plot.block("points", points);

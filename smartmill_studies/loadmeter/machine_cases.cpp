@@ -5,6 +5,7 @@
 #include <random>
 
 #include "smartmill_core/cutting/rigid_cut.h"
+#include "smartmill_core/math/running_line.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/machine_calibration.h"
 
@@ -194,7 +195,7 @@ CaseErrors judge(const MachineCase& one, const Faults& faults) {
   const ToolGeometry& tool = *one.model.tool;
   // The thesis: straight lines through steady means, friction zero below 2000 rpm, one speed.
   std::vector<AirCut> air;
-  double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+  RunningLine line;  // [N/m] over [m]
   IdleVoltage idle;
   double slot_speed = 0.0;
   for (const auto& [test, record] : one.tests) {
@@ -207,7 +208,7 @@ CaseErrors judge(const MachineCase& one, const Faults& faults) {
       continue;
     }
     const double zero_below = units::radPerSecFromRpm(ZERO_BELOW_RPM);
-    if (n == 0.0) {
+    if (line.count() == 0) {
       idle = fitIdleVoltage(air, zero_below, s.load_meter_resolution);
       slot_speed = test.spindle_speed;
     }
@@ -217,11 +218,10 @@ CaseErrors judge(const MachineCase& one, const Faults& faults) {
     const double y = (level - friction) / (s.load_meter_gain * w) /
                      (tool.radius() * tool.teeth * test.engagement->axial_depth);
     const double x = test.engagement->feed_per_tooth;
-    n += 1.0, sx += x, sy += y, sxx += x * x, sxy += x * y;
+    line.add(x, y);
   }
-  const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
-  errors.thesis_ktc = slope * PI / one.truth.ktc - 1.0;
-  errors.thesis_kte = (sy - slope * sx) / n * 2.0 / one.truth.kte - 1.0;
+  errors.thesis_ktc = line.slope() * PI / one.truth.ktc - 1.0;
+  errors.thesis_kte = line.level() * 2.0 / one.truth.kte - 1.0;
 
   LoadRecordOptions options;
   options.depth_uncertainty = faults.depth_error;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/math/running_line.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/steady_path.h"
@@ -120,10 +121,11 @@ void SegmentRecorder::handle(const ForceBlock& compensated) {
 // Linear fit of the angles of a segment; nothing if the speed is not constant.
 std::optional<SegmentRecorder::SpindleRotation> SegmentRecorder::steadyRotation(double begin,
                                                                                 double end) const {
-  double n = 0.0, st = 0.0, sa = 0.0, stt = 0.0, sta = 0.0, unwrapped = 0.0, last = 0.0, last_stamp = 0.0;
+  RunningLine line;  // [rad] over [s]
+  double unwrapped = 0.0, last = 0.0, last_stamp = 0.0;
   for (const SpindleAngle& a : angles_) {
     if (a.stamp < begin || a.stamp > end) continue;
-    if (n == 0.0) {
+    if (line.count() == 0) {
       unwrapped = a.angle;
     } else {
       const double expected = a.speed * (a.stamp - last_stamp);
@@ -131,20 +133,14 @@ std::optional<SegmentRecorder::SpindleRotation> SegmentRecorder::steadyRotation(
     }
     last = a.angle;
     last_stamp = a.stamp;
-    const double t = a.stamp - begin;
-    n += 1.0;
-    st += t;
-    sa += unwrapped;
-    stt += t * t;
-    sta += t * unwrapped;
+    line.add(a.stamp - begin, unwrapped);
   }
-  const double det = n * stt - st * st;
-  if (n < 3.0 || det <= 0.0) return {};
+  if (line.count() < 3 || !line.isDetermined()) return {};
   SpindleRotation rotation;
-  rotation.speed = (n * sta - st * sa) / det;
-  rotation.phase = (sa - rotation.speed * st) / n;
+  rotation.speed = line.slope();
+  rotation.phase = line.level();
   const bool is_steady = std::all_of(angles_.begin(), angles_.end(), [&](const SpindleAngle& a) {
-    const double expected = rotation.phase + rotation.speed * (a.stamp - begin);
+    const double expected = line.at(a.stamp - begin);
     return a.stamp < begin || a.stamp > end ||
            std::abs(std::remainder(a.angle - expected, units::TWO_PI)) < limits_.angle;
   });

@@ -17,6 +17,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
+#include "smartmill_core/math/running_line.h"
 #include "smartmill_core/signal/derivative.h"
 #include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
@@ -84,21 +85,16 @@ class RecordStreams {
   /// [m/s] Least-squares slope of the way over the time between two stamps, which late positions change less
   /// than the feed at one of them; 0 with fewer than three positions.
   double meanFeed(double from, double to) const {
-    double n = 0.0, t_sum = 0.0, s_sum = 0.0, tt = 0.0, ts = 0.0, way = 0.0;
+    RunningLine line;  // [m] over [s]
+    double way = 0.0;
     for (std::size_t k = 1; k < size(); ++k) {
       if (stamp(k) < from || stamp(k) >= to) continue;
-      if (n > 0.0)
+      if (line.count() > 0)
         way += std::hypot(position_[0][k] - position_[0][k - 1], position_[1][k] - position_[1][k - 1],
                           position_[2][k] - position_[2][k - 1]);
-      const double t = stamp(k) - from;
-      n += 1.0;
-      t_sum += t;
-      s_sum += way;
-      tt += t * t;
-      ts += t * way;
+      line.add(stamp(k), way);
     }
-    const double det = n * tt - t_sum * t_sum;
-    return n < 3.0 || !(det > 0.0) ? 0.0 : (n * ts - t_sum * s_sum) / det;
+    return line.count() < 3 || !line.isDetermined() ? 0.0 : line.slope();
   }
   CncState state(std::size_t k) const {
     CncState state;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "smartmill_core/axis_names.h"
+#include "smartmill_core/math/running_line.h"
 #include "smartmill_core/signal/steady_path.h"
 
 namespace smartmill::loadmeter {
@@ -154,19 +155,14 @@ LoadTest SteadyRecord::test(double since) const {
 
 std::array<double, 3> SteadyRecord::velocity() const {
   std::array<double, 3> velocity{{0.0, 0.0, 0.0}};
-  if (path_.empty()) return velocity;
   // Line of all points: on a busy computer the first or the last state may be stamped late.
-  double middle = 0.0;  // [s] after the first
-  for (const PathPoint& point : path_)
-    middle += (point.stamp - path_.front().stamp) / static_cast<double>(path_.size());
-  double squares = 0.0;  // [s2]
+  std::array<RunningLine, 3> line;  // [m] over [s]
   for (const PathPoint& point : path_) {
-    const double time = point.stamp - path_.front().stamp - middle;
-    squares += time * time;
-    for (std::size_t a = 0; a < 3; ++a) velocity[a] += time * (point.position[a] - path_.front().position[a]);
+    for (std::size_t a = 0; a < 3; ++a) line[a].add(point.stamp, point.position[a]);
   }
-  if (!(squares > 0.0)) return {{0.0, 0.0, 0.0}};
-  for (double& v : velocity) v /= squares;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (line[a].isDetermined()) velocity[a] = line[a].slope();
+  }
   return velocity;
 }
 
