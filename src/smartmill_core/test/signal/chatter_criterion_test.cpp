@@ -182,7 +182,9 @@ TEST(ChatterCriterion, aLostToothIsNoFlip) {
         window.add(force);
         const ChatterEvidence evidence = ChatterCriterion({}).judge(window, PERIOD);
         EXPECT_FALSE(evidence.chatter) << teeth << " teeth";
-        if (lost) EXPECT_GT(evidence.alternation, 0.05) << teeth << " teeth";
+        if (lost) {
+          EXPECT_GT(evidence.alternation, 0.05) << teeth << " teeth";
+        }
       }
     }
   }
