@@ -34,7 +34,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double LOAD_TIMEOUT = 0.1;   // [s] of a load meter outside the controller: two periods of 20 Hz
 constexpr double HOLDER_PERIOD = 1.0;  // [s] between two checks of the client that armed motion
 
 double steadySeconds() {
@@ -44,7 +43,7 @@ double steadySeconds() {
 std::shared_ptr<linuxcnc::ServoStream> makeStream(const NodeParameters& parameters) {
   if (parameters.kind != "linuxcnc") return nullptr;
   linuxcnc::ServoStreamOptions options;
-  if (!parameters.load_input.empty()) options.load_timeout = LOAD_TIMEOUT;
+  if (!parameters.load_input.empty()) options.load_timeout = parameters.load_timeout;
   return std::make_shared<linuxcnc::ServoStream>(parameters.linuxcnc.folder, options);
 }
 

@@ -41,6 +41,8 @@ void NodeParameters::declare(ParameterTable& table) {
   linuxcnc.declare(table);
   table.text("load_input", load_input,
              "topic (LoadSample) of a load meter outside the controller; empty: none");
+  table.number("load_timeout", load_timeout, "s", Range::positive(),
+               "age from which on the load of load_input is not known (NaN)");
   table.section();
   table.number("rate", rate, "Hz", Range::closed(1.0, 200.0), "rate of cnc/state and cnc/load");
   table.number("reconnect_period", reconnect_period, "s", Range::positive(),

@@ -16,6 +16,7 @@ struct NodeParameters {
   FocasParameters controller;
   linuxcnc::LinuxCncParameters linuxcnc;
   std::string load_input;
+  double load_timeout = 0.1;
   double rate = 50.0;
   double reconnect_period = 1.0;
   MotionParameters motion;
