@@ -1,6 +1,5 @@
 // rosrun smartmill_launch record -o FILE PATTERN...
 
-#include <atomic>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -8,9 +7,9 @@
 #include <ros/console.h>
 
 #include "node/bag_recorder.h"
-#include "node/shutdown_request.h"
 #include "smartmill_core/io/disk_space.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/stop_signal.h"
 #include "smartmill_ros/master_watch.h"
 
 namespace {
@@ -31,14 +30,13 @@ bool isFull(const std::string& path) {
   return false;
 }
 
-void run(const std::string& path, const std::vector<std::string>& patterns, std::uint64_t split,
-         const std::atomic<bool>& shutdown) {
+void run(const std::string& path, const std::vector<std::string>& patterns, std::uint64_t split) {
   constexpr double SUBSCRIBE_PERIOD = 0.5, STEP = 0.1;  // [s] of wall time
   const ros::NodeHandle nh;
   smartmill::session::BagRecorder recorder(nh, path, patterns, split);
   const smartmill::MasterWatch master(nh);
   ros::SteadyTime subscribed;
-  while (!shutdown && ros::ok()) {
+  while (!smartmill::stopRequested() && ros::ok()) {
     if ((ros::SteadyTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
       if (isFull(recorder.file())) return recorder.close();
       recorder.subscribe();
@@ -54,7 +52,7 @@ void run(const std::string& path, const std::vector<std::string>& patterns, std:
 int main(int argc, char** argv) {
   // Messages that are queued when the shutdown is requested are still written.
   ros::init(argc, argv, "record", ros::init_options::NoSigintHandler);
-  const std::atomic<bool>& shutdown = smartmill::session::catchShutdownRequest();
+  smartmill::catchStopSignals();
   std::string path;
   std::vector<std::string> patterns;
   double split = 2048.0;
@@ -67,6 +65,6 @@ int main(int argc, char** argv) {
       .within(1.0, 1e9)
       .showDefault();
   line.option("patterns", patterns, "regular expressions that match full topic names").required();
-  return smartmill::runProgram(
-      line, argc, argv, [&] { run(path, patterns, static_cast<std::uint64_t>(1e6 * split), shutdown); });
+  return smartmill::runProgram(line, argc, argv,
+                               [&] { run(path, patterns, static_cast<std::uint64_t>(1e6 * split)); });
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <smartmill_msgs/ChooseProbingCut.h>
 #include <smartmill_msgs/CoefficientPrior.h>
@@ -65,9 +66,9 @@ std::string pointText(const Point& point) {
 
 }  // namespace
 
-Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const std::atomic<bool>& stop)
+Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, std::function<bool()> stopped)
     : nh_(std::move(nh)),
-      stop_(stop),
+      stopped_(std::move(stopped)),
       parameters_(parametersFromServer(private_nh).readAll<SessionParameters>()),
       model_(readMachineModel(parameters_.model)),
       plan_(model_, parameters_.cuts()),
@@ -76,7 +77,7 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
       identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
       drive_(nh_, names::IDENTIFY_AXIS_DRIVE, false),
-      driver_(nh_, [this] { return stop_.load(); }),
+      driver_(nh_, stopped_),
       sensor_(nh_, parameters_.calibration, driver_, sensor_frf_,
               [this](const std::string& request) { log_.request(request); }),
       kept_(nh_, "progress") {
@@ -841,7 +842,7 @@ std::string Session::cutUnderControl(const PlannedCut& cut) {
 void Session::makeSafe() {
   if (!armed_ || !ros::ok()) return;
   try {
-    log_.record("stop", "disarm motion", driver_.makeSafe(stop_));
+    log_.record("stop", "disarm motion", driver_.makeSafe(stopped_()));
     armed_ = false;
   } catch (const Error& error) {
     log_.record("FAIL", "disarm motion", error.what());

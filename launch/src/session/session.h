@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -32,9 +31,9 @@ namespace smartmill::session {
 /// Runs all steps of a session in order, by actions and services of the other nodes.
 class Session {
  public:
-  /// @param stop set by a signal handler: goals are cancelled, motion is disarmed. @throws Error on an
+  /// @param stopped polled: once true, goals are cancelled and motion is disarmed. @throws Error on an
   /// invalid parameter or a session that does not fit the machine.
-  Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const std::atomic<bool>& stop);
+  Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, std::function<bool()> stopped);
   ~Session();
 
   /// @return exit code of the program.
@@ -88,7 +87,7 @@ class Session {
   std::string recorderMissing() const;
 
   ros::NodeHandle nh_;
-  const std::atomic<bool>& stop_;
+  const std::function<bool()> stopped_;
   SessionParameters parameters_;
   MachineModel model_;
   SessionPlan plan_;

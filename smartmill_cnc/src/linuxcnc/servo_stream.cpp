@@ -75,7 +75,7 @@ void ServoStream::restart(const ServoBlock& block) {
   begun_ = true;
 }
 
-std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double arrival) {
+std::vector<ServoSegment> ServoStream::addBlock(ServoBlock block, double arrival) {
   std::vector<ServoSegment> segments;
   if (block.samples.empty()) {
     return segments;
@@ -94,15 +94,15 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
     }
   }
   clock_.addArrival(next_ + block.samples.size() - 1, arrival);
-  const bool load_is_valid = arrival - load_stamp_ <= options_.load_timeout;
-  for (ServoSample sample : block.samples) {
+  if (arrival - load_stamp_ > options_.load_timeout) {
+    for (ServoSample& sample : block.samples) {
+      sample.spindle_load = NOT_A_NUMBER;
+    }
+    statistics_.without_load += block.samples.size();
+  }
+  for (const ServoSample& sample : block.samples) {
     const std::uint64_t number = next_++;
     ++statistics_.samples;
-    if (!load_is_valid) {
-      sample.spindle_load = NOT_A_NUMBER;
-      ++statistics_.without_load;
-    }
-    latest_ = sample;
     if (!clock_.settled()) {
       continue;
     }
@@ -116,6 +116,7 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
       segments.push_back(std::exchange(segment_, {}));
     }
   }
+  latest_ = block.samples.back();
   return segments;
 }
 

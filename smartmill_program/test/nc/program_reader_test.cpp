@@ -51,8 +51,6 @@ TEST(ProgramReader, LinesWithModalState) {
   expectPoint(moves[2].path.target(), 50, 10, -2);
 }
 
-// Half circle about (10, 0): by I and J, and by R; seen from +z clockwise it passes y > 0 when it starts at x
-// = 0.
 // A comment in a line of its own, with or without N; one behind words names nothing.
 TEST(ProgramReader, CommentsAreNames) {
   const std::vector<Move> moves = movesOf(
@@ -72,6 +70,8 @@ TEST(ProgramReader, CommentsAreNames) {
   EXPECT_EQ(nameAt(5), "last");
 }
 
+// Half circle about (10, 0): by I and J, and by R; seen from +z clockwise it passes y > 0 when it starts at x
+// = 0.
 TEST(ProgramReader, ArcsByCentreAndByRadius) {
   for (const std::string arc : {"G2 X20 Y0 I10 J0 F100", "G2 X20 Y0 R10 F100", "G2 X20 I10 F100"}) {
     const auto moves = movesOf(START + arc + "\nM30\n");

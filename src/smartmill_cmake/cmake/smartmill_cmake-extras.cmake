@@ -194,19 +194,22 @@ function(smartmill_gtest name)
   add_dependencies(${PROJECT_NAME}_gtests ${PROJECT_NAME}_${name})
 endfunction()
 
+# smartmill_gtest_properties(NAME PROPERTY VALUE ...): of a gtest of this package for ctest; without tests nothing.
+function(smartmill_gtest_properties name)
+  if(TARGET ${PROJECT_NAME}_${name})
+    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${PROJECT_NAME}_${name} PROPERTIES ${ARGN})
+  endif()
+endfunction()
+
 # smartmill_run_alone(NAME): a gtest of this package that runs while no other does, as it has a real-time thread.
 function(smartmill_run_alone name)
-  if(TARGET ${PROJECT_NAME}_${name})
-    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${PROJECT_NAME}_${name} PROPERTIES RUN_SERIAL TRUE)
-  endif()
+  smartmill_gtest_properties(${name} RUN_SERIAL TRUE)
 endfunction()
 
 # smartmill_start_early(NAME): a long gtest of this package that starts before shorter ones, as a processor would be idle
 # at the end of all tests otherwise.
 function(smartmill_start_early name)
-  if(TARGET ${PROJECT_NAME}_${name})
-    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${PROJECT_NAME}_${name} PROPERTIES COST 100)
-  endif()
+  smartmill_gtest_properties(${name} COST 100)
 endfunction()
 
 # smartmill_rostest(LAUNCH_FILE NAME SOURCES a.cpp ... LIBRARIES x ... NODES t ...): a gtest node run by rostest.

@@ -77,7 +77,7 @@ class ServoStream {
   /// clock [s]
   std::vector<ServoSegment> step(double wait, double (*now)());
   /// Processes one block; called by step().
-  std::vector<ServoSegment> addBlock(const ServoBlock& block, double arrival);
+  std::vector<ServoSegment> addBlock(ServoBlock block, double arrival);
 
   std::optional<ServoSample> latest() const;  ///< empty before the first
   std::uint64_t count() const;                ///< [1] received samples
