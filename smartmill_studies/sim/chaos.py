@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Production on the simulated machine while processes are killed, stopped and starved and sensors are faulty, at random; an observer checks
-what must hold.
+"""Production on the simulated machine while processes are killed, stopped and starved, sensors are faulty, the controller is disconnected,
+replies and ports get invalid bytes and the disk is full, at random; an observer checks what must hold.
 
 usage: devel/env.sh smartmill_studies/sim/chaos.py [--seeds N] [--first S] [--seconds T] [--pace P] [--without-faults] [--out FOLDER]
                                                                                               (in the repository's folder)
@@ -8,11 +8,13 @@ usage: devel/env.sh smartmill_studies/sim/chaos.py [--seeds N] [--first S] [--se
 simulated time per wall time. --without-faults: production alone; memory, descriptors, threads and latency of the nodes are compared from
 the second minute on. --out: folder for the recording and log of each run that violates a rule, and for runs.jsonl.
 
-Prints one line per run and the figures over all. Exit code 1: a rule was violated.
+Prints one line per run and the figures over all. Exit code 1: a rule was violated. Without the right to mount a file system (unshare) the disk
+is never full, which the first line states.
 
-Rules: no feed and no spindle rotation 2 s after motion was disarmed, no position beyond the limits of the model, every message
-between publisher and recorder and every sample accounted for, forces that are wrong are marked or announced, the database is whole, and
-within 30 s after a fault the graph is in full service again without a person: all nodes report, forces are compensated, and a program runs.
+Rules: no feed and no spindle rotation 2 s after motion was disarmed or the bridge has lost the controller, no position beyond the limits of the
+model, every message between publisher and recorder and every sample accounted for, forces that are wrong are marked or announced, the database
+is whole, no cut that a full disk refused is missing in it afterwards, and within 30 s after a fault the graph is in full service again without a
+person: all nodes report, forces are compensated, and a program runs.
 """
 import argparse
 import json
@@ -23,6 +25,7 @@ import random
 import re
 import shutil
 import signal
+import socket
 import sqlite3
 import statistics
 import subprocess
@@ -31,14 +34,21 @@ import tempfile
 import threading
 import time
 
-from sensor_faults import ROOT, free_port
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cnc"))
+import focas_wire  # noqa: E402
+from ros_processes import ROOT, free_port  # noqa: E402
 
 NODES = ("cnc", "frames", "hammer", "kalman", "loadmeter", "stability")
 STREAMS = ("daq/dynamometer", "spindle/angle")
 # With the words of StreamCheck's table: faults that the stream alone shows. A wrong scale, sign or order does not.
 SENSOR_FAULTS = ("off", "stuck", "garbage", "delayed", "intermittent", "duplicated", "clock_step", "slow")
-KINDS = ("kill", "stop", "starve", "sensor")
-STANDSTILL = 2.0        # [s] simulated, after motion was disarmed
+KINDS = ("kill", "stop", "starve", "sensor", "disconnect", "corrupt", "fill")
+REPLIES = {"version 0": focas_wire.spoiled(focas_wire.set_at(5, 0)), "a length beyond the frame": focas_wire.spoiled(focas_wire.set_at(12, 0xFF)),
+           "another request's reply": focas_wire.spoiled(focas_wire.wrong_opcode), "no frame": focas_wire.spoiled(focas_wire.set_at(1, 0)),
+           "half a frame": lambda frame: (frame[:11],), "none": lambda frame: b"", "10,000 foreign bytes before it": focas_wire.flood}
+DISK_MB = 64            # file system of database and logs
+INTRUDERS = 8           # connections with invalid bytes to each port of a node
+STANDSTILL = 2.0        # [s] simulated, after motion was disarmed or the controller was lost
 SILENT = 2.5            # [s] wall, of a node that reports once a second
 ABANDON = 2.0           # [s] wall, after which a goal whose program does not run is given up
 RECOVERY = 30.0         # [s] wall, in which the graph must be in full service again
@@ -47,6 +57,7 @@ WRONG = 0.5             # [1] error of a block's RMS over that of the true force
 LEAST_FORCE = 20.0      # [N] RMS of a block that is judged
 STEADY = 0.3            # [1] range of the RMS of five blocks in a steady cut
 AFTER = 2.0             # [s] simulated after a fault, in which its consequences end
+OWN_MOUNTS = "SMARTMILL_OWN_MOUNTS"  # set to 1: this process may mount file systems that others do not see
 COMPENSATED, PASSED_THROUGH, TRANSIENT = 1, 2, 4  # ForceBlock.status
 LIMITS = {"X": 0.25, "Y": 0.2, "Z": 0.3}  # [m] travel of launch/models/mill.yaml, to both sides; Z to 0
 
@@ -58,16 +69,45 @@ def slot(number):
                       "G0 Z-150.", "M30", ""))
 
 
+class Disk:
+    """File system of database, logs and motion log, which can be filled where this process may mount one."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        folder.mkdir()
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={DISK_MB}m", "none", str(folder)]
+        self.mounted = os.environ.get(OWN_MOUNTS) == "1" and subprocess.run(mount, capture_output=True).returncode == 0
+
+    def fill(self):
+        with open(self.folder / "filling", "wb", buffering=0) as file:
+            try:
+                while True:
+                    file.write(bytes(1 << 20))
+            except OSError:
+                pass
+
+    def clear(self):
+        (self.folder / "filling").unlink()
+
+    def end(self):
+        if self.mounted:
+            subprocess.run(["umount", "--lazy", str(self.folder)], check=True)
+
+
 class Graph:
     """The pipeline in a process group of its own."""
 
     def __init__(self, folder, pace, port=None):
         """@param port of a master that runs; None: roslaunch starts one"""
         self.folder = folder
+        self.disk = Disk(folder / "disk")
+        self.controller = free_port()
+        self.proxy = focas_wire.Proxy(self.controller)
         self.master = f"http://localhost:{port or free_port()}"
-        os.environ.update(ROS_MASTER_URI=self.master, ROS_HOSTNAME="localhost", ROS_HOME=str(folder / "home"))
-        arguments = ["smartmill_launch", "pipeline.launch", f"pace:={pace}", f"machine:={ROOT / 'launch/models/mill_twin.yaml'}", f"port:={free_port()}", f"bag:={folder / 'run.bag'}",
-                     f"database:={folder / 'machine.sqlite'}", "faults:=true", f"fault_topics:={' '.join(STREAMS)}", f"motion_log:={folder / 'motion.log'}"]
+        os.environ.update(ROS_MASTER_URI=self.master, ROS_HOSTNAME="localhost", ROS_HOME=str(self.disk.folder / "home"))
+        arguments = ["smartmill_launch", "pipeline.launch", f"pace:={pace}", f"machine:={ROOT / 'launch/models/mill_twin.yaml'}", f"port:={self.controller}",
+                     f"bridge_port:={self.proxy.port}", f"bag:={folder / 'run.bag'}", f"database:={self.disk.folder / 'machine.sqlite'}", "faults:=true",
+                     f"fault_topics:={' '.join(STREAMS)}", f"motion_log:={self.disk.folder / 'motion.log'}"]
         self.log = open(folder / "log.txt", "wb")
         self.launch = subprocess.Popen(["roslaunch", "-p", self.master.rsplit(":", 1)[1], *arguments], stdout=self.log, stderr=subprocess.STDOUT,
                                        start_new_session=True)
@@ -224,41 +264,64 @@ class Observer:
         except Exception:
             return None
 
+    def ports_of(self, node):
+        """Of its XML-RPC server and of its topics; empty: the node is not there"""
+        import rosgraph
+        from xmlrpc.client import ServerProxy
+        try:
+            uri = rosgraph.Master("/observer").lookupNode("/smartmill/" + node if node != "frames" else "/frames")
+            topics = ServerProxy(uri).requestTopic("/observer", "/rosout", [["TCPROS"]])
+            return [int(uri.rstrip("/").rsplit(":", 1)[1]), int(topics[2][2])]
+        except Exception:
+            return []
+
 
 class Faults:
     """Draws the faults of a seed and makes them."""
 
-    def __init__(self, seed, observer):
-        self.random, self.observer = random.Random(seed), observer
+    def __init__(self, seed, observer, graph):
+        self.random, self.observer, self.graph = random.Random(seed), observer, graph
+        self.kinds = [kind for kind in KINDS if kind != "fill" or graph.disk.mounted]
 
     def make(self):
         """@return kind, what, end of the fault (wall), whether its direct consequence is over"""
-        draw, rospy = self.random, self.observer.rospy
-        kind = draw.choice(KINDS)
-        node, length, stream, fault = draw.choice(NODES), draw.uniform(0.3, 3.0), draw.choice(STREAMS), draw.choice(SENSOR_FAULTS)
-        if kind in ("kill", "stop"):
-            process = self.observer.process_of(node)
-            if process is None:
-                return kind, node + " (not there)", time.monotonic(), lambda: True
-            before = self.observer.starts_of(node)
-            if kind == "kill":
-                os.kill(process, signal.SIGKILL)
-                return kind, node, time.monotonic(), lambda: self.observer.starts_of(node) not in (before, None)
-            else:
-                os.kill(process, signal.SIGSTOP)
-                time.sleep(length)
-                try:
-                    os.kill(process, signal.SIGCONT)
-                except ProcessLookupError:
-                    pass
-            return kind, node, time.monotonic(), lambda: True
-        if kind == "starve":
-            busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * os.cpu_count())]
-            time.sleep(length)
-            for process in busy:
-                process.kill()
-                process.wait()
-            return kind, f"{length:.1f} s", time.monotonic(), lambda: True
+        draw = self.random
+        kind = draw.choice(self.kinds)
+        node, length = draw.choice(NODES), draw.uniform(0.3, 3.0)
+        what, is_over = getattr(self, kind)(node, length)
+        return kind, what, time.monotonic(), is_over or (lambda: True)
+
+    def kill(self, node, _):
+        process = self.observer.process_of(node)
+        if process is None:
+            return node + " (not there)", None
+        before = self.observer.starts_of(node)
+        os.kill(process, signal.SIGKILL)
+        return node, lambda: self.observer.starts_of(node) not in (before, None)
+
+    def stop(self, node, length):
+        process = self.observer.process_of(node)
+        if process is None:
+            return node + " (not there)", None
+        os.kill(process, signal.SIGSTOP)
+        time.sleep(length)
+        try:
+            os.kill(process, signal.SIGCONT)
+        except ProcessLookupError:
+            pass
+        return node, None
+
+    @staticmethod
+    def starve(_, length):
+        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * os.cpu_count())]
+        time.sleep(length)
+        for process in busy:
+            process.kill()
+            process.wait()
+        return f"{length:.1f} s", None
+
+    def sensor(self, _, length):
+        rospy, stream, fault = self.observer.rospy, self.random.choice(STREAMS), self.random.choice(SENSOR_FAULTS)
         try:
             answer = self.observer.fault_service(topic=stream, fault=fault, duration=length, value=0.0)
             what = f"{stream} {fault}" + ("" if answer.code == 0 else f" refused: {answer.message}")
@@ -267,7 +330,56 @@ class Faults:
         until = rospy.Time.now().to_sec() + length
         while rospy.Time.now().to_sec() < until:
             time.sleep(0.02)
-        return kind, what, time.monotonic(), lambda: True
+        return what, None
+
+    def disconnect(self, _, length):
+        """The bridge loses the controller, and is refused."""
+        begin = self.observer.rospy.Time.now().to_sec()
+        self.graph.proxy.shut()
+        self.at_rest(begin, time.monotonic() + length)
+        self.graph.proxy.listen()
+        return f"{length:.1f} s", None
+
+    def corrupt(self, node, length):
+        """Replies of the controller are invalid, or a node's ports get invalid bytes."""
+        if self.random.random() < 0.5:
+            what = self.random.choice(list(REPLIES))
+            self.graph.proxy.down = REPLIES[what]
+            time.sleep(length)
+            self.graph.proxy.calm()
+            return "reply: " + what, None
+        intruders = []
+        for port in self.observer.ports_of(node) * INTRUDERS:
+            intruders.append(socket.create_connection(("127.0.0.1", port), 5.0))
+            try:
+                intruders[-1].sendall(self.random.randbytes(self.random.randint(1, 65536)))
+            except OSError:  # the node has closed it
+                pass
+        time.sleep(length)
+        for intruder in intruders:
+            intruder.close()
+        return "ports of " + node, None
+
+    def fill(self, _, length):
+        """No byte can be added to database, logs and motion log."""
+        self.graph.disk.fill()
+        time.sleep(length)
+        self.graph.disk.clear()
+        return f"{length:.1f} s", None
+
+    def at_rest(self, begin, end):
+        """Until @p end (wall): nothing may move from @p begin + STANDSTILL (simulated) on, as the controller itself reports."""
+        rospy = self.observer.rospy
+        while time.monotonic() < end and rospy.Time.now().to_sec() < begin + STANDSTILL:
+            time.sleep(0.02)
+        if time.monotonic() < end:
+            session = focas_wire.Observer(self.graph.controller)
+            before = session.read()
+            time.sleep(max(0.05, end - time.monotonic()))
+            after = session.read()
+            session.close()
+            if before[:3] != after[:3] or before[3] != 0.0:
+                self.observer.violate(f"motion without a connection: position {before[:3]} then {after[:3]} mm, spindle {before[3]:.0f} rpm")
 
 
 def force_blocks(bag):
@@ -338,7 +450,7 @@ def run(seed, arguments):
             time.sleep(0.05)
         if observer.missing():
             raise RuntimeError("the graph does not start: " + ", ".join(observer.missing()))
-        faults = Faults(seed, observer)
+        faults = Faults(seed, observer, graph)
         begin, first_stamp = time.monotonic(), observer.rospy.Time.now().to_sec()
         stamps, pending, pause = [], None, faults.random.expovariate(1.0 / MEAN_PAUSE)
         while time.monotonic() - begin < arguments.seconds or (pending and time.monotonic() - pending < RECOVERY):
@@ -385,7 +497,7 @@ def run(seed, arguments):
             result["violations"].append(f"{wrong} of {judged} blocks of compensated force are wrong and not marked")
     else:
         result["violations"].append("no recording")
-    database = folder / "machine.sqlite"
+    database = graph.disk.folder / "machine.sqlite"
     if database.exists():
         with sqlite3.connect(database) as connection:
             whole = connection.execute("PRAGMA integrity_check").fetchone()[0]
@@ -393,6 +505,7 @@ def run(seed, arguments):
                 result["violations"].append("database: " + whole)
     if result["violations"] and arguments.out:
         shutil.copytree(folder, pathlib.Path(arguments.out) / f"seed_{seed}", dirs_exist_ok=True)
+    graph.disk.end()
     shutil.rmtree(folder, ignore_errors=True)
     return result
 
@@ -434,9 +547,14 @@ def main():
         return 0
     if arguments.out:
         pathlib.Path(arguments.out).mkdir(parents=True, exist_ok=True)
+    own_mounts = ["unshare", *([] if os.getuid() == 0 else ["--map-root-user"]), "--mount"]
+    if shutil.which("unshare") is None or subprocess.run([*own_mounts, "true"], capture_output=True).returncode != 0:
+        own_mounts = []
+        print("the disk is never full: this process may not mount a file system")
+    os.environ[OWN_MOUNTS] = "1" if own_mounts else "0"
     results = []
     for seed in range(arguments.first, arguments.first + arguments.seeds):
-        command = [sys.executable, __file__, "--one", "--first", str(seed), "--seconds", str(arguments.seconds), "--pace", str(arguments.pace)]
+        command = [*own_mounts, sys.executable, __file__, "--one", "--first", str(seed), "--seconds", str(arguments.seconds), "--pace", str(arguments.pace)]
         command += ["--without-faults"] if arguments.without_faults else []
         command += ["--out", arguments.out] if arguments.out else []
         done = subprocess.run(command, capture_output=True, text=True)
