@@ -59,14 +59,24 @@ STEADY = 0.3            # [1] range of the RMS of five blocks in a steady cut
 AFTER = 2.0             # [s] simulated after a fault, in which its consequences end
 OWN_MOUNTS = "SMARTMILL_OWN_MOUNTS"  # set to 1: this process may mount file systems that others do not see
 COMPENSATED, PASSED_THROUGH, TRANSIENT = 1, 2, 4  # ForceBlock.status
+STEADY_PATH = 0.13      # [m] to both sides of the middle of the stock
 LIMITS = {"X": 0.25, "Y": 0.2, "Z": 0.3}  # [m] travel of launch/models/mill.yaml, to both sides; Z to 0
 
 
-def slot(number):
-    """NC program of one slot in the stock of mill_twin.yaml: nine lanes on each level, each 1 mm deep"""
+def slot(number, kind):
+    """NC program and condition of one slot in the stock of mill_twin.yaml, nine lanes on each level, each 1 mm deep, or of an air cut above it"""
+    from smartmill_msgs.msg import CuttingCondition
     lane, level = number % 9, number // 9
-    return "\n".join(("G90 G0 Z-150.", f"G0 X-152. Y{-80 + 20 * lane}.", "S4000 M3", "G4 X1.", f"G0 Z{-161 - level}.", "G1 X152. F1600.",
-                      "G0 Z-150.", "M30", ""))
+    y, z = -80 + 20 * lane, -150 if kind == CuttingCondition.AIR else -161 - level
+    feed_per_tooth = (1e-4, 7.5e-5)[number % 2]
+    program = "\n".join(("G90 G0 Z-150.", f"G0 X-152. Y{y}.", "S4000 M3", "G4 X1.", f"G0 Z{z}.", f"G1 X152. F{feed_per_tooth * 4 * 4000 * 1e3:.0f}.",
+                         "G0 Z-150.", "M30", ""))
+    name = ("air cut " if kind == CuttingCondition.AIR else "slot ") + str(number)
+    condition = CuttingCondition(kind=kind, name=name, material="al7050", tool="end_mill", teeth=4, diameter=0.01905, helix=math.radians(30.0),
+                                 spindle_speed=4000 * math.pi / 30, feed_per_tooth=feed_per_tooth, axial_depth=1e-3, entry_angle=0.0, exit_angle=math.pi)
+    for point, x in ((condition.steady_from, -STEADY_PATH), (condition.steady_to, STEADY_PATH)):
+        point.x, point.y, point.z = x, 1e-3 * y, 1e-3 * z
+    return program, condition
 
 
 class Disk:
@@ -149,6 +159,10 @@ class Observer:
         self.heard, self.health, self.series = {}, {}, {}
         self.state, self.disarmed_since, self.force_status, self.force_at = None, None, None, 0.0
         self.finished, self.sent_at, self.ran_at = 0, None, 0.0
+        self.sent = None          # what was sent: kind, number of the slot, starts of loadmeter, stamp
+        self.air_known_to = None  # starts of loadmeter that has measured an air cut
+        self.first_of = {}        # number of each slot that was sent: stamp at its first time
+        self.cuts = []            # finished slots, milled without interruption, of which loadmeter makes a record: stamps of begin and end
         self.client = actionlib.SimpleActionClient("/smartmill/cnc/run_program", RunProgramAction)
         self.arm_service = rospy.ServiceProxy("/smartmill/cnc/arm_motion", ArmMotion)
         self.fault_service = rospy.ServiceProxy("/smartmill/sim/set_fault", SetFault)
@@ -209,7 +223,7 @@ class Observer:
             return min(*heard, self.heard.get("state", -math.inf), self.force_at) > time_of_end
 
     def produce(self):
-        """Arms and sends the next slot when none runs."""
+        """Arms and sends the next slot, or the air cut that loadmeter needs, when none runs."""
         from smartmill_msgs.msg import CuttingCondition, RunProgramGoal
         state = self.state
         if state is None or not state.connected or time.monotonic() - self.heard["state"] > 1.0:
@@ -222,7 +236,7 @@ class Observer:
                 return
             self.client.stop_tracking_goal()
         elif self.sent_at is not None and self.client.get_state() == 3:
-            self.finished += 1
+            self.finish(state.header.stamp.to_sec())
         self.sent_at = None
         if state.run == 3 and state.armed:
             return
@@ -239,14 +253,29 @@ class Observer:
         except self.rospy.ServiceException:
             return
         now = self.rospy.Time.now()
-        # A slot that was not finished is milled again: the next level must not be twice as deep, which would chatter.
-        goal = RunProgramGoal(name=f"slot {self.finished}", program=slot(self.finished))
-        goal.header.stamp = now
-        goal.condition = CuttingCondition(kind=2, name=goal.name, material="al7050", tool="end_mill", teeth=4, diameter=0.01905, helix=math.radians(30.0),
-                                          spindle_speed=4000 * math.pi / 30, feed_per_tooth=1e-4, axial_depth=1e-3, entry_angle=0.0, exit_angle=math.pi)
-        goal.condition.header.stamp = now
-        self.sent_at = time.monotonic()
+        starts = self.starts_of("loadmeter")
+        kind = CuttingCondition.CUT if starts == self.air_known_to else CuttingCondition.AIR
+        # A slot that was not finished is milled again: the next level must not be twice as deep, which would chatter. As a part of it is cut, it has
+        # no steady part.
+        program, condition = slot(self.finished, kind)
+        if kind == CuttingCondition.CUT and self.finished in self.first_of:
+            condition.steady_to = condition.steady_from
+        goal = RunProgramGoal(name=condition.name, program=program, condition=condition)
+        goal.header.stamp = goal.condition.header.stamp = now
+        self.sent, self.sent_at = (kind, self.finished, starts, now.to_sec()), time.monotonic()
+        self.first_of.setdefault(self.finished if kind == CuttingCondition.CUT else None, now.to_sec())
         self.client.send_goal(goal)
+
+    def finish(self, stamp):
+        """The program that was sent has ended."""
+        from smartmill_msgs.msg import CuttingCondition
+        kind, number, starts, begin = self.sent
+        if kind == CuttingCondition.AIR:
+            self.air_known_to = starts
+            return
+        self.finished += 1
+        if self.first_of[number] == begin and starts == self.starts_of("loadmeter"):
+            self.cuts.append((begin, stamp))
 
     def starts_of(self, node):
         """Of a node; frames, which reports no health, by its process."""
@@ -418,11 +447,29 @@ def unmarked(bag, faults):
         if block is None or level < LEAST_FORCE or near.max() > (1.0 + STEADY) * near.min():
             continue
         (stamp, status, force), truth = block, true[order[k]][2]
-        if status != COMPENSATED or len(truth) != len(force) or any(begin <= stamp <= end + AFTER for begin, end in faults) or not numpy.isfinite(force).all():
+        if status != COMPENSATED or len(truth) != len(force) or any(begin <= stamp <= end + AFTER for begin, end, *_ in faults) or not numpy.isfinite(force).all():
             continue
         judged += 1
         wrong += bool(numpy.sqrt(numpy.mean((force - truth) ** 2)) > WRONG * level)
     return wrong, judged
+
+
+def unstored(database, cuts, faults):
+    """@return what is wrong with the records of the cuts; number of records that had to be there. Cuts without states of the controller have none."""
+    with sqlite3.connect(database) as connection:
+        whole = connection.execute("PRAGMA integrity_check").fetchone()[0]
+        if whole != "ok":
+            return ["database: " + whole], 0
+        records = [stamp for (stamp,) in connection.execute("SELECT stamp FROM coefficients")]
+    wrong, owed = [], 0
+    for begin, end in cuts:
+        if any((kind in ("disconnect", "corrupt") or what == "cnc") and start < end + AFTER and until > begin - AFTER for start, until, kind, what in faults):
+            continue
+        owed += 1
+        number = sum(begin <= stamp <= end for stamp in records)
+        if number != 1:
+            wrong.append(f"database: {number} records of the cut from {begin:.1f} to {end:.1f} s, expected 1")
+    return wrong, owed
 
 
 def account_of(bag):
@@ -473,7 +520,7 @@ def run(seed, arguments):
             elif time.monotonic() - (since if result["faults"] else begin) > pause and time.monotonic() - begin < arguments.seconds:
                 from_stamp = observer.rospy.Time.now().to_sec()
                 kind, what, pending, is_over = faults.make()
-                stamps.append([from_stamp - 0.1, math.inf])
+                stamps.append([from_stamp - 0.1, math.inf, kind, what])
                 result["faults"].append([kind, what])
             time.sleep(0.05)
         result["simulated"] = round(observer.rospy.Time.now().to_sec() - first_stamp, 1)
@@ -481,9 +528,10 @@ def run(seed, arguments):
         result["violations"] += observer.violations
         result["restarts"] = {name.split("/")[-1]: m.starts - 1 for name, m in observer.health.items() if m.starts > 1}
         result["series"] = observer.series
+        cuts = observer.cuts
     except RuntimeError as error:
         result["violations"].append(str(error))
-        stamps = []
+        stamps, cuts = [], []
     finally:
         graph.end()
     bag = folder / "run.bag"
@@ -499,10 +547,8 @@ def run(seed, arguments):
         result["violations"].append("no recording")
     database = graph.disk.folder / "machine.sqlite"
     if database.exists():
-        with sqlite3.connect(database) as connection:
-            whole = connection.execute("PRAGMA integrity_check").fetchone()[0]
-            if whole != "ok":
-                result["violations"].append("database: " + whole)
+        wrong, result["records"] = unstored(database, cuts, stamps)
+        result["violations"] += wrong[:3]
     if result["violations"] and arguments.out:
         shutil.copytree(folder, pathlib.Path(arguments.out) / f"seed_{seed}", dirs_exist_ok=True)
     graph.disk.end()
@@ -566,7 +612,7 @@ def main():
             with open(pathlib.Path(arguments.out) / "runs.jsonl", "a") as file:
                 file.write(json.dumps(result) + "\n")
         print(f"seed {seed}: {len(result['faults'])} faults, recovery at most {max(result['recovery'], default=0):.1f} s, {result.get('simulated', 0):.0f} s simulated, "
-              f"{result.get('slots', 0)} slots, {result.get('samples', 0)} samples, {result.get('wrong', 0)} of {result.get('judged', 0)} blocks wrong; "
+              f"{result.get('slots', 0)} slots, {result.get('records', 0)} records of cuts, {result.get('samples', 0)} samples, {result.get('wrong', 0)} of {result.get('judged', 0)} blocks wrong; "
               + ("; ".join(result["violations"]) or "no rule violated"), flush=True)
         if arguments.without_faults:
             print("\n".join(growth(series)), flush=True)

@@ -71,19 +71,33 @@ MotionLog::MotionLog(std::string file) : file_(std::move(file)) {
   ::close(descriptor);
 }
 
-// Opened for each line, so that the file can be rotated.
-void MotionLog::write(double time, const std::string& client, const std::string& what) const {
+void MotionLog::write(double time, const std::string& client, const std::string& what) {
+  constexpr std::size_t MOST_KEPT = 1u << 20;  // [bytes]
   if (file_.empty()) return;
   std::string line = utcText(time) + "  " + named(client) + "  " + what;
   std::replace_if(
       line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
   line += '\n';
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (kept_.size() + line.size() > MOST_KEPT) throw failure(file_, ENOSPC);
+  kept_ += line;
+  writeAll();
+}
+
+void MotionLog::writeKept() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!kept_.empty()) writeAll();
+}
+
+// Opened each time, so that the file can be rotated.
+void MotionLog::writeAll() {
   const int descriptor = openToAppend(file_);
   if (descriptor < 0) throw failure(file_, errno);
-  const ssize_t written = ::write(descriptor, line.data(), line.size());
+  const ssize_t written = ::write(descriptor, kept_.data(), kept_.size());
   const int number = errno;
   ::close(descriptor);
-  if (written != static_cast<ssize_t>(line.size())) throw failure(file_, written < 0 ? number : ENOSPC);
+  if (written > 0) kept_.erase(0, static_cast<std::size_t>(written));
+  if (!kept_.empty()) throw failure(file_, written < 0 ? number : ENOSPC);
 }
 
 }  // namespace smartmill::cnc

@@ -405,9 +405,13 @@ bool CncNode::armMotion(ArmEvent& event) {
 }
 
 void CncNode::record(const std::string& client, const std::string& what) {
+  writeLog([&] { motion_log_.write(ros::Time::now().toSec(), client, what); });
+}
+
+void CncNode::writeLog(const std::function<void()>& write) {
   std::string problem;
   try {
-    motion_log_.write(ros::Time::now().toSec(), client, what);
+    write();
   } catch (const Error& error) {
     problem = std::string("motion log: ") + error.what();
     ROS_ERROR_STREAM_THROTTLE(60.0, problem);
@@ -417,6 +421,7 @@ void CncNode::record(const std::string& client, const std::string& what) {
 }
 
 void CncNode::watchHolder() {
+  writeLog([this] { motion_log_.writeKept(); });
   std::optional<ArmHolder> holder;
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -70,6 +70,7 @@ class CncNode {
   bool setOverrides(OverrideEvent& event);
   /// Adds a line to the motion log.
   void record(const std::string& client, const std::string& what);
+  void writeLog(const std::function<void()>& write);
   /// Disarms when the client that armed motion has ended.
   void watchHolder();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);

@@ -1,5 +1,6 @@
 #include "smartmill_cnc/motion/arming.h"
 
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -8,6 +9,8 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
+
+namespace fs = std::filesystem;
 
 namespace smartmill::cnc {
 namespace {
@@ -54,6 +57,22 @@ TEST(MotionLog, LinesAreAddedAndNoneIsLost) {
   EXPECT_NO_THROW(MotionLog("").write(0.0, "/a", "arm"));
   EXPECT_THROW(MotionLog("/dev/full").write(0.0, "/a", "arm"), Error);
   EXPECT_THROW(MotionLog(folder.file("state")), Error);
+}
+
+TEST(MotionLog, LinesThatAFullDiskRefusesAreWrittenLater) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("motion.log");
+  fs::create_symlink("/dev/full", file);
+  MotionLog log(file);
+  EXPECT_THROW(log.write(1700000000.9, "/a", "arm: motion is armed"), Error);
+  EXPECT_THROW(log.writeKept(), Error);
+  fs::remove(file);
+  log.write(1700000001.0, "/a", "program x");
+  log.writeKept();
+  std::ifstream stream(file);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}),
+            "2023-11-14 22:13:20 UTC  /a  arm: motion is armed\n"
+            "2023-11-14 22:13:21 UTC  /a  program x\n");
 }
 
 }  // namespace

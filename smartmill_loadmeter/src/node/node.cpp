@@ -208,14 +208,10 @@ void LoadMeterNode::finish(const IdentifyResult& result) {
   }
   if (found) {
     coefficients_->publish("last", message.coefficients);
-    try {
-      CoefficientRecord record = result.record;
-      record.machine = parameters_.machine;
-      database_.add(record);
-    } catch (const Error& error) {
-      ROS_ERROR("database: %s", error.what());
-      message.message += "; not stored: " + std::string(error.what());
-    }
+    CoefficientRecord record = result.record;
+    record.machine = parameters_.machine;
+    if (!keep("coefficients", [this, record] { database_.add(record); }))
+      message.message += "; not stored yet: " + records_.problem();
   }
   const auto waiting = waiting_.find(result.id);
   if (waiting == waiting_.end()) return;
@@ -291,13 +287,31 @@ bool LoadMeterNode::recommend(smartmill_msgs::RecommendCut::Request& request,
   return true;
 }
 
+LoadMeterNode::~LoadMeterNode() {
+  records_.retry();
+  if (records_.size() > 0)
+    ROS_ERROR("database: %s lost, as the node ends: %s", countOf(records_.size(), "record").c_str(),
+              records_.problem().c_str());
+}
+
+// @return whether it is stored; otherwise it waits until the database takes it
+bool LoadMeterNode::keep(const char* what, WaitingRecords::Store store) {
+  const std::size_t lost = records_.lost();
+  if (records_.add(std::move(store))) return true;
+  ROS_ERROR("database: %s not stored yet, in all %s: %s", what, countOf(records_.size(), "record").c_str(),
+            records_.problem().c_str());
+  if (records_.lost() > lost) ROS_ERROR("database: the oldest record is lost, %zu in all", records_.lost());
+  return false;
+}
+
+void LoadMeterNode::retryStoring() {
+  const std::size_t stored = records_.retry();
+  if (stored > 0) ROS_INFO("database: %s stored after waiting", countOf(stored, "record").c_str());
+}
+
 void LoadMeterNode::store(CoefficientRecord cut) {
   cut.machine = parameters_.machine;
-  try {
-    stored_cuts_ += database_.add(cut);
-  } catch (const Error& error) {
-    ROS_ERROR("database: cut not stored: %s", error.what());
-  }
+  keep("cut", [this, cut] { stored_cuts_ += database_.add(cut); });
 }
 
 // The report contains the evidence, whichever node explained.
@@ -307,7 +321,9 @@ void LoadMeterNode::store(const smartmill_msgs::DiscoverActionResult& discovered
     ModelImprovement improvement = readImprovement(discovered.result.report);
     improvement.machine = parameters_.machine;
     improvement.stamp = discovered.header.stamp.toSec();
-    stored_explanations_ += database_.evidence().add(std::vector<ModelImprovement>{improvement});
+    keep("explanation", [this, improvement] {
+      stored_explanations_ += database_.evidence().add(std::vector<ModelImprovement>{improvement});
+    });
   } catch (const Error& error) {
     ROS_ERROR("database: explanation not stored: %s", error.what());
   }
@@ -328,11 +344,7 @@ void LoadMeterNode::store(const smartmill_msgs::SpindleHealth& health) {
     r.drifted = c.drifted ? 1.0 : 0.0;
     records.push_back(r);
   }
-  try {
-    stored_health_ += database_.evidence().add(records);
-  } catch (const Error& error) {
-    ROS_ERROR("database: spindle health not stored: %s", error.what());
-  }
+  keep("spindle health", [this, records] { stored_health_ += database_.evidence().add(records); });
 }
 
 void LoadMeterNode::store(InspectionResult inspected) {
@@ -350,7 +362,9 @@ void LoadMeterNode::store(InspectionResult inspected) {
     if (!inspected.note.empty())
       ROS_WARN("inspection, '%s': %s", record.condition.c_str(), inspected.note.c_str());
     const EvidenceRecords evidence = database_.evidence();
-    stored_inspections_ += evidence.add(std::vector<InspectionRecord>{record});
+    keep("inspection", [this, record] {
+      stored_inspections_ += database_.evidence().add(std::vector<InspectionRecord>{record});
+    });
     last_inspection_.clear();
     for (const std::string& line :
          inspectionEvidence(evidence.inspections(record.tool), parameters_.identification.inspection)
@@ -377,6 +391,7 @@ void LoadMeterNode::publishFleetState() {
 
 // Liveness: when all inputs have stopped, nothing can precede the waiting ones.
 void LoadMeterNode::watch() {
+  retryStoring();
   publishFleetState();
   axis_drives_.watch();
   if (!shell_.inputs().any().dead()) return;
@@ -426,6 +441,11 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   if (!last_curve_.empty()) status.add("force curve", last_curve_);
   status.add("database", opened_.file.empty() ? "records of this run only" : opened_.file);
   if (!opened_.problem.empty()) status.mergeSummary(Level::WARN, "database: " + opened_.problem);
+  if (records_.size() > 0) {
+    status.add("records that wait for the database", records_.size());
+    status.mergeSummary(Level::ERROR, "database: " + records_.problem());
+  }
+  if (records_.lost() > 0) status.add("records lost", records_.lost());
   status.add("cuts stored", stored_cuts_);
   status.add("explanations stored", stored_explanations_);
   status.add("spindle-health quantities stored", stored_health_);

@@ -13,6 +13,7 @@
 #include "node/wiring.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database_location.h"
+#include "smartmill_loadmeter/database/waiting_records.h"
 #include "smartmill_loadmeter/identification/identification_pipeline.h"
 #include "smartmill_msgs/CoefficientPrior.h"
 #include "smartmill_msgs/DiscoverActionResult.h"
@@ -31,6 +32,9 @@ class LoadMeterNode {
   using Parameters = NodeParameters;
   /// @throws Error for an invalid parameter, model or database.
   LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  ~LoadMeterNode();
+  LoadMeterNode(const LoadMeterNode&) = delete;
+  LoadMeterNode& operator=(const LoadMeterNode&) = delete;
 
  private:
   using Server = actionlib::ActionServer<smartmill_msgs::IdentifyCoefficientsAction>;
@@ -43,6 +47,8 @@ class LoadMeterNode {
             smartmill_msgs::FindCoefficients::Response& response);
   bool recommend(smartmill_msgs::RecommendCut::Request& request,
                  smartmill_msgs::RecommendCut::Response& response);
+  bool keep(const char* what, WaitingRecords::Store store);
+  void retryStoring();
   void store(CoefficientRecord cut);
   void store(const smartmill_msgs::DiscoverActionResult& discovered);
   void store(const smartmill_msgs::SpindleHealth& health);
@@ -64,6 +70,7 @@ class LoadMeterNode {
   CutStreams streams_{identification_, curves_, parameters_};
   OpenedDatabase opened_;
   CoefficientDatabase& database_;
+  WaitingRecords records_;
   std::unique_ptr<FleetPusher> pusher_;
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,7 +30,8 @@ std::string clientOfGoal(const std::string& goal_id);
 /// Date and time of day. @param time [s] since 1970 @return "2026-11-27 21:20:03 UTC"
 std::string utcText(double time);
 
-/// Append-only record of who armed, disarmed and moved the machine: one line each, with the time.
+/// Append-only record of who armed, disarmed and moved the machine: one line each, with the time. Lines that
+/// cannot be written (full disk) are kept, up to 1 MB, and written before the next one.
 class MotionLog {
  public:
   /// Creates the file and its folder if they do not exist. @param file empty: no record
@@ -37,11 +39,17 @@ class MotionLog {
   explicit MotionLog(std::string file);
 
   /// @param time [s] since 1970 @throws Error naming the file
-  void write(double time, const std::string& client, const std::string& what) const;
+  void write(double time, const std::string& client, const std::string& what);
+  /// Tries again to write the lines that are kept. @throws Error naming the file
+  void writeKept();
   const std::string& file() const { return file_; }
 
  private:
+  void writeAll();
+
   std::string file_;
+  std::mutex mutex_;
+  std::string kept_;
 };
 
 }  // namespace smartmill::cnc
