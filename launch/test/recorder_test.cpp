@@ -101,7 +101,7 @@ TEST(Recorder, PartsAndWhatIsLeftOfTheLastAreOneCompleteRecording) {
   const std::string whole = folder.file("whole.bag");
   const ConvertedRecording joined = convertRecording(files, whole, RecordingCompression::lz4);
   EXPECT_EQ(joined.messages, received + 1);  // the latched message is there once
-  const RecordingAccount account = accountOf(whole);
+  const RecordingAccount account = accountOf({whole});
   EXPECT_TRUE(account.isComplete());
   EXPECT_LE(received, sent);
   EXPECT_LE((sent - received) * SIZE * sizeof(double), 2 * CHUNK);  // one, and what was on its way

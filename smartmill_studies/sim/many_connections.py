@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 
-from chaos import percentile
+from judgement import percentile
 from master_restarts import wait
 from node_restarts import processes, usage
 from sensor_faults import free_port
@@ -71,7 +71,6 @@ def crowd(port, number, request, draw):
 
 
 def main():
-    import rosgraph
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--connections", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)

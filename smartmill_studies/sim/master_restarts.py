@@ -18,7 +18,8 @@ import sys
 import tempfile
 import time
 
-from chaos import Graph, account_of, percentile
+from judgement import account_of, percentile
+from production import Graph
 from sensor_faults import free_port
 
 LONGEST = 30.0  # [s]

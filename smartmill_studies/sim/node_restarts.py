@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 
-from chaos import percentile
+from judgement import percentile
 from master_restarts import wait
 from sensor_faults import free_port
 

@@ -19,7 +19,8 @@ import tempfile
 import threading
 import time
 
-from chaos import Graph, account_of, await_master
+from judgement import account_of
+from production import Graph, await_master
 
 TOPICS = ("daq/dynamometer", "spindle/angle", "force/compensated")
 DELAY = 0.2  # [s] of a slow subscriber for each message

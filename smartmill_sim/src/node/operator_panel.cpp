@@ -94,6 +94,14 @@ void OperatorPanel::advertiseManualActions(World& world, const WorldOptions& opt
       return {};
     });
   }
+  advertise("new_workpiece", 0, [&world](const Request&) -> std::string {
+    try {
+      world.changeWorkpiece();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return {};
+  });
   if (options.plate.present) {
     actions_[Action::TAP_POINT] = [&world, vector](const Action& a) { world.setTapPoint(vector(a.point)); };
     advertise("tap_point", 3, [&world, triple](const Request& request) -> std::string {

@@ -75,6 +75,7 @@ World::World(const MachineModel& model, const WorldOptions& options)
       servo_(options.servo_trigger, options.motor.drives()),
       station_(stationOf(model, options)),
       tip_(withStructure(model, station_).tool_tip),
+      workpiece_(model.workpiece),
       random_{std::mt19937_64(options.seed), {}} {
   model.needTool("simulate the machine");
   model.needCutting("simulate the machine");
@@ -83,7 +84,7 @@ World::World(const MachineModel& model, const WorldOptions& options)
   addTool(0, structured);
   for (const auto& [number, tool] : options.magazine) addTool(number, withTool(structured, tool));
   tool_ = &tools_.at(0);
-  if (model.workpiece) stock_.emplace(*model.workpiece, tool_->geometry());
+  if (workpiece_) stock_.emplace(*workpiece_, tool_->geometry());
   last_ = controller_.motion();
   const PlacedFrame dynamometer = placedFrame(model.frames, frames::DYNAMOMETER, frames::MACHINE);
   if (dynamometer.isTurned()) {
@@ -171,6 +172,13 @@ void World::setToolLength(double length) {
 void World::setTapPoint(const std::array<double, 3>& point) {
   const Lock lock(mutex_);
   manual_.tap_point = point;
+}
+
+void World::changeWorkpiece() {
+  const Lock lock(mutex_);
+  if (!workpiece_) throw Error("workpiece: the model states none");
+  if (last_.spindle_speed > 0.0) throw Error("workpiece: the spindle turns, expected at rest");
+  stock_.emplace(*workpiece_, tool_->geometry());
 }
 
 void World::advance(Block& block) {

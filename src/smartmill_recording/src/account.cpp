@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <list>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -183,11 +184,30 @@ class Stream {
   std::uint64_t first_first_ = 0, last_first_ = 0;  // running indices of these blocks
 };
 
+using Streams = std::list<Stream>;
+
+// Stream of a connection of the present part: the newest of the same publisher in the earlier parts, or a new
+// one.
+Stream& streamOf(const RecordedConnection& connection, const std::map<std::uint32_t, Stream*>& present,
+                 Streams* streams, std::vector<StreamGap>* gaps, NodeAccounts* nodes) {
+  Stream begun(connection, gaps, nodes);
+  const StreamAccount sought = begun.account();
+  for (auto earlier = streams->rbegin(); earlier != streams->rend(); ++earlier) {
+    const StreamAccount found = earlier->account();
+    if (found.topic != sought.topic || found.publisher != sought.publisher) continue;
+    const bool continues = std::none_of(present.begin(), present.end(),
+                                        [&](const auto& one) { return one.second == &*earlier; });
+    if (continues) return *earlier;
+    break;
+  }
+  return streams->emplace_back(std::move(begun));
+}
+
 // The sensor whose running index the forces have: of those recorded the one with most samples of them.
-const Stream* sensorOf(const std::map<std::uint32_t, Stream>& streams, const Stream& forces) {
+const Stream* sensorOf(const Streams& streams, const Stream& forces) {
   const Stream* best = nullptr;
   std::uint64_t least = 0;
-  for (const auto& [id, stream] : streams) {
+  for (const Stream& stream : streams) {
     const std::string topic = stream.account().topic;
     if (topic != names::absolute(names::DYNAMOMETER) && topic != names::absolute(names::SPINDLE_FORCE))
       continue;
@@ -228,25 +248,31 @@ std::vector<IndexRange> missingRanges(const std::vector<IndexRange>& all,
   return missing;
 }
 
-RecordingAccount accountOf(const std::string& path, const std::function<void(double)>& progress) {
+RecordingAccount accountOf(const std::vector<std::string>& parts,
+                           const std::function<void(double)>& progress) {
   constexpr std::uint64_t REPORTED = 4096;  // messages between two reports of the progress
-  const std::unique_ptr<RecordingFile> file = openRecording(path);
   RecordingAccount result;
-  std::map<std::uint32_t, Stream> streams;
+  Streams streams;
   NodeAccounts nodes;
-  RecordingFile::Entry entry;
-  for (std::uint64_t count = 0; file->next(&entry); ++count) {
-    if (progress && count % REPORTED == 0) progress(file->share());
-    const RecordedConnection& connection = file->connection(entry);
-    Stream& stream = streams.try_emplace(entry.connection, connection, &result.gaps, &nodes).first->second;
-    try {
-      stream.add(file->data(entry), entry.size);
-    } catch (const Error& error) {
-      throw Error(path + ": topic " + connection.topic + ": " + error.what());
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    const std::unique_ptr<RecordingFile> file = openRecording(parts[part]);
+    std::map<std::uint32_t, Stream*> of_connection;
+    RecordingFile::Entry entry;
+    for (std::uint64_t count = 0; file->next(&entry); ++count) {
+      if (progress && count % REPORTED == 0)
+        progress((static_cast<double>(part) + file->share()) / static_cast<double>(parts.size()));
+      const RecordedConnection& connection = file->connection(entry);
+      Stream*& stream = of_connection[entry.connection];
+      if (!stream) stream = &streamOf(connection, of_connection, &streams, &result.gaps, &nodes);
+      try {
+        stream->add(file->data(entry), entry.size);
+      } catch (const Error& error) {
+        throw Error(parts[part] + ": topic " + connection.topic + ": " + error.what());
+      }
     }
   }
   if (progress) progress(1.0);
-  for (const auto& [id, stream] : streams) {
+  for (const Stream& stream : streams) {
     result.streams.push_back(stream.account());
     if (result.streams.back().topic != names::absolute(names::FORCE_COMPENSATED)) continue;
     const Stream* const sensor = sensorOf(streams, stream);

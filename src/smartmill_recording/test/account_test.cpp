@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,10 +32,15 @@ class Account : public ::testing::Test {
   using Fault = std::function<void(int, Message&)>;
 
   RecordingAccount of(
-      const Fault& sensor, const Fault& force = [](int, Message&) {}) {
-    const std::string path = folder_.file("session.bag");
-    const auto writer = createRecording(path, RecordingCompression::none);
+      const Fault& sensor, const Fault& force = [](int, Message&) {}, int parts = 1) {
+    std::vector<std::string> paths;
+    std::unique_ptr<RecordingWriter> writer;
     for (int k = 0; k < 100; ++k) {
+      if (k % (100 / parts) == 0) {
+        if (writer) writer->close();
+        paths.push_back(folder_.file("part_" + std::to_string(k) + ".bag"));
+        writer = createRecording(paths.back(), RecordingCompression::none);
+      }
       const auto time = static_cast<std::uint64_t>((STAMP + 0.01 * k) * 1e9);
       const Message regular{static_cast<std::uint32_t>(k) + 7, START + SIZE * static_cast<std::uint64_t>(k)};
       Message m = regular;
@@ -45,7 +51,7 @@ class Account : public ::testing::Test {
       if (!m.drop) writer->write(names::FORCE_COMPENSATED, time, forceBlock(m));
     }
     writer->close();
-    return accountOf(path);
+    return accountOf(paths);
   }
   static const StreamAccount& stream(const RecordingAccount& account, const char* topic) {
     for (const StreamAccount& s : account.streams) {
@@ -169,7 +175,7 @@ TEST(NodeAccount, SumsAllStarts) {
   write(STAMP, 1, 200, 3);
   write(STAMP + 50.0, 2, 40, 2);
   writer->close();
-  const RecordingAccount account = accountOf(folder.file("session.bag"));
+  const RecordingAccount account = accountOf({folder.file("session.bag")});
   ASSERT_EQ(account.inputs.size(), 1u);
   EXPECT_EQ(account.inputs[0].topic, "/smartmill/daq/dynamometer");
   EXPECT_EQ(account.inputs[0].starts, 2u);
@@ -178,6 +184,18 @@ TEST(NodeAccount, SumsAllStarts) {
   EXPECT_EQ(account.inputs[0].dropped, 2u);
   EXPECT_TRUE(account.gaps.empty());
   EXPECT_FALSE(account.isComplete());
+}
+
+TEST_F(Account, PublishersContinueFromOnePartOfARecordingToTheNext) {
+  const RecordingAccount whole = of([](int, Message&) {}, [](int, Message&) {}, 4);
+  EXPECT_TRUE(whole.isComplete());
+  ASSERT_EQ(whole.streams.size(), 2u);
+  EXPECT_EQ(stream(whole, names::DYNAMOMETER).messages, 100u);
+  EXPECT_EQ(stream(whole, names::DYNAMOMETER).samples, 100 * SIZE);
+  // The first message of the second part.
+  const RecordingAccount lost = of([](int k, Message& m) { m.drop = k == 25; }, [](int, Message&) {}, 4);
+  EXPECT_EQ(stream(lost, names::DYNAMOMETER).lost_messages, 1u);
+  EXPECT_EQ(stream(lost, names::DYNAMOMETER).lost_samples, SIZE);
 }
 
 TEST(MissingRanges, AreThoseWithinThePresentOnes) {

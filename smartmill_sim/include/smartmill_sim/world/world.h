@@ -142,6 +142,8 @@ class World {
   void setToolLength(double length);
   /// Point of hits on the workpiece. @param point [m] from the plate's origin
   void setTapPoint(const std::array<double, 3>& point);
+  /// Clamps an uncut workpiece of the model. Thread-safe. @throws Error without one or when the spindle turns
+  void changeWorkpiece();
 
   /// Breaks a tooth of the tool in the spindle from the next block on. Thread-safe. @param tooth 1..teeth, 0:
   /// a new tool, all teeth whole @param length [m] that its radius loses, from that of the whole tooth; 0:
@@ -181,6 +183,7 @@ class World {
   ServoRecorder servo_;
   std::optional<HammerStation> station_;
   ToolTip tip_;
+  std::optional<Workpiece> workpiece_;
   std::map<int, MountedTool> tools_;  // by T; 0: that of the model
   MountedTool* tool_;                 // in the spindle
   std::optional<StockContact> stock_;

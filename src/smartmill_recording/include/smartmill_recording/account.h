@@ -62,8 +62,11 @@ struct RecordingAccount {
 /// running index, and the samples of the force sensor that force/compensated lacks between its first and its
 /// last; and what each node has received. What was lost before the first or after the last message of a
 /// publisher leaves no trace.
+/// @param parts files of one recording, in order; a publisher's messages and samples continue from one to the
+/// next
 /// @param progress as RecordingReader::run(). @throws Error naming a file that is damaged.
-RecordingAccount accountOf(const std::string& path, const std::function<void(double)>& progress = {});
+RecordingAccount accountOf(const std::vector<std::string>& parts,
+                           const std::function<void(double)>& progress = {});
 
 /// Parts of `all` that `present` lacks, both ascending and disjoint, within the range of `present`.
 std::vector<IndexRange> missingRanges(const std::vector<IndexRange>& all,

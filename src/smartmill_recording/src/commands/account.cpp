@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_recording/account.h"
@@ -59,11 +60,11 @@ void printInputs(const std::vector<InputAccount>& inputs) {
 }
 
 struct Arguments {
-  std::string recording;
+  std::vector<std::string> parts;
 };
 
 int run(const Arguments& arguments) {
-  const RecordingAccount account = accountOf(arguments.recording, printReadingProgress);
+  const RecordingAccount account = accountOf(arguments.parts, printReadingProgress);
   std::printf("%-44s %9s %6s %10s %6s %8s %10s %12s  %s\n", "topic", "messages", "lost", "samples", "lost",
               "not fin.", "rate [Hz]", "by stamps", "publisher");
   for (const StreamAccount& s : account.streams) {
@@ -101,11 +102,13 @@ Command accountCommand() {
       "and forces by their running index, the samples of the force sensor that have no compensated force, "
       "and "
       "by the topic health what each node has received, lost, dropped and refused.";
-  command.examples = {{"session.bag", "proves that nothing is missing, or lists what is"}};
-  command.files = {{"RECORDING", "bag or MCAP file"}};
+  command.examples = {{"session.bag", "proves that nothing is missing, or lists what is"},
+                      {"week.bag week_1.bag week_2.bag", "a recording in parts"}};
+  command.files = {{"RECORDING", "bag or MCAP file; several: parts of one recording, in order"}};
   command.exits = {{INCOMPLETE, "messages or samples are missing or repeated"}};
   command.setBody(run, [](CommandLine& line, Arguments& arguments) {
-    line.option("RECORDING", arguments.recording, "bag or MCAP file").required();
+    line.option("RECORDING", arguments.parts, "bag or MCAP files, the parts of one recording in order")
+        .required();
   });
   return command;
 }
