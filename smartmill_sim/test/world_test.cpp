@@ -582,6 +582,29 @@ TEST(World, CuttingWithTheSpindleAtRestIsRefused) {
   EXPECT_LT(machine.position.back()[0], -50e-3 - RADIUS + 5e-3);
 }
 
+// A slot that is milled again finds no material, one in a new workpiece the same force.
+TEST(World, ANewWorkpieceIsUncut) {
+  const std::string slot = "G90\nG0 X-60\nS6000 M3\nG4 P500\nG0 Z-1\nG1 F2400 X40\nM5\nG0 Z5\nM30\n";
+  Machine machine(millThatCuts());
+  const auto largest = [&] {
+    const std::size_t begin = machine.force[1].size();
+    machine.program(slot);
+    machine.run(5.0);
+    double force = 0.0;
+    for (std::size_t i = begin; i < machine.force[1].size(); ++i)
+      force = std::max(force, std::abs(machine.force[1][i]));
+    return force;
+  };
+  const double first = largest();
+  EXPECT_GT(first, 100.0);
+  EXPECT_LT(largest(), 1e-6 * first);
+  machine.world.changeWorkpiece();
+  EXPECT_NEAR(largest(), first, 0.02 * first);
+  machine.program("S6000 M3\n");
+  machine.run(2.0);
+  EXPECT_THROW(machine.world.changeWorkpiece(), Error);
+}
+
 TEST(World, PlungingIsRefused) {
   Machine machine(millThatCuts());
   machine.program("G90\nG0 X0\nS6000 M3\nG4 P500\nG1 F600 Z-5\n");

@@ -204,6 +204,8 @@ CncNode::~CncNode() {
 void CncNode::run() {
   const auto period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / parameters_.rate));
+  // States before the first message of a simulated clock would have the stamp 0.
+  while (!stopping_ && !ros::Time::isValid()) ros::WallDuration(0.01).sleep();
   Clock::time_point next = Clock::now();
   for (int count = 0; !stopping_; ++count) {
     std::vector<Job> jobs;
@@ -316,7 +318,9 @@ void CncNode::publish(const ros::Time& stamp) {
   if (const std::optional<MachineTemperature>& temperature = bridge_.temperature()) {
     temperature_publisher_.publish(toMsg(*temperature));
   }
-  if (state.connected) {
+  // A simulated clock may stand still between two polls.
+  if (state.connected && stamp != transform_stamp_) {
+    transform_stamp_ = stamp;
     geometry_msgs::TransformStamped transform;
     transform.header.stamp = stamp;
     transform.header.frame_id = frames::MACHINE;

@@ -87,6 +87,7 @@ class CncNode {
   ros::Publisher state_publisher_, load_publisher_, temperature_publisher_, condition_publisher_,
       alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
+  ros::Time transform_stamp_;
   ros::ServiceServer arm_service_, hold_service_, macro_service_, override_service_;
   std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;
   std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
