@@ -65,10 +65,7 @@ void LoadMeterIdentification::handle(const SampleBlock& block) {
 void LoadMeterIdentification::handle(const LoadSample& sample) {
   temperature_.handle(sample);
   const SteadyRecord::Reading reading = steady_.handle(sample);
-  if (reading == SteadyRecord::Reading::not_finite && session_.bad_data.empty()) {
-    session_.bad_data = formatted("test '%s': the load sample at %.3f s is not a finite number",
-                                  steady_.condition()->name.c_str(), sample.stamp);
-  }
+  if (reading == SteadyRecord::Reading::unknown) ++session_.unknown_loads;
   if (reading == SteadyRecord::Reading::steady && outputs_.force_window && parameters_.force.period > 0.0 &&
       steady_.isCut())
     estimateWindow(sample.stamp);
@@ -112,9 +109,11 @@ void LoadMeterIdentification::closeTest() {
   steady_.end();
   if (steady_.readings() >= static_cast<std::size_t>(parameters_.minimum_readings))
     return storeTest(steady_.test());
+  const std::string unknown =
+      steady_.unknown() > 0 ? " (" + countOf(steady_.unknown(), "load sample") + " not known)" : "";
   session_.rejected.push_back("'" + steady_.condition()->name +
-                              "': " + countOf(steady_.readings(), "steady reading") + ", expected " +
-                              std::to_string(parameters_.minimum_readings) + " or more");
+                              "': " + countOf(steady_.readings(), "steady reading") + unknown +
+                              ", expected " + std::to_string(parameters_.minimum_readings) + " or more");
 }
 
 void LoadMeterIdentification::storeTest(LoadTest test) {

@@ -227,11 +227,6 @@ IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& 
   result.id = goal.id;
   result.coefficients.value = result.coefficients.std_dev = NOT_IDENTIFIED;
   result.coefficients.stamp = goal.stamp;
-  if (!session.bad_data.empty()) {
-    result.code = IdentifyResult::Code::bad_data;
-    result.message = session.bad_data;
-    return result;
-  }
   std::vector<LoadTest> cuts;
   for (const LoadTest& test : session.cuts) {
     if ((goal.tool.empty() || test.condition.tool_name == goal.tool) &&
@@ -250,7 +245,8 @@ IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& 
     found = identifyFromTests(session.air_cuts, cuts, spindle, spindle_uncertainty_percent, largest_runout,
                               goal.prior ? 2 : 3);
   } catch (const Error& error) {
-    result.code = IdentifyResult::Code::too_few_tests;
+    result.code =
+        session.unknown_loads > 0 ? IdentifyResult::Code::bad_data : IdentifyResult::Code::too_few_tests;
     result.message = error.what() + aside;
     return result;
   }

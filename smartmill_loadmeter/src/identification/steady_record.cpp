@@ -31,6 +31,7 @@ SteadyRecord::SteadyRecord(const Spindle& spindle, const IdentificationParameter
 void SteadyRecord::begin(const std::optional<CuttingCondition>& condition) {
   clear();
   condition_ = condition;
+  unknown_ = 0;
   at_speed_since_.reset();
   on_path_since_.reset();
   path_.clear();
@@ -109,13 +110,15 @@ SteadyRecord::Reading SteadyRecord::handle(const LoadSample& sample) {
   const bool gap = sample.stamp - last_load_ > parameters_.maximum_gap;
   last_load_ = sample.stamp;
   if (!isTest()) return Reading::ignored;
-  if (!std::isfinite(sample.spindle_load) || !std::isfinite(sample.spindle_speed)) return Reading::not_finite;
-  const bool steady = std::abs(sample.spindle_speed - condition_->spindle_speed) <=
-                      parameters_.speed_tolerance * condition_->spindle_speed;
+  const bool known = std::isfinite(sample.spindle_load) && std::isfinite(sample.spindle_speed);
+  if (!known) ++unknown_;
+  const bool steady = known && std::abs(sample.spindle_speed - condition_->spindle_speed) <=
+                                   parameters_.speed_tolerance * condition_->spindle_speed;
   if (at_speed_since_ && (!steady || gap)) {
     dropAfter(sample.stamp - parameters_.guard_time);
     at_speed_since_.reset();
   }
+  if (!known) return Reading::unknown;
   if (!steady) return Reading::ignored;
   if (!at_speed_since_) at_speed_since_ = sample.stamp;
   double since = *at_speed_since_;

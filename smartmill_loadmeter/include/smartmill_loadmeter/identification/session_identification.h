@@ -65,7 +65,7 @@ std::string countOf(std::size_t n, const char* what);
 struct SessionTests {
   std::vector<LoadTest> air_cuts, cuts;
   std::vector<std::string> rejected;  ///< tests that are not used, each with the reason
-  std::string bad_data;               ///< why the data are unusable; empty: they are not
+  std::size_t unknown_loads = 0;      ///< load samples of the tests that are not numbers
 
   void clear() { *this = {}; }
 };

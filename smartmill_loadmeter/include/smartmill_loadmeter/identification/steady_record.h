@@ -17,7 +17,7 @@ namespace smartmill::loadmeter {
 /// meter has settled. Where the feed turns, force and motors have no mean and are not recorded.
 class SteadyRecord {
  public:
-  enum class Reading { ignored, steady, not_finite };
+  enum class Reading { ignored, steady, unknown };
 
   SteadyRecord(const Spindle& spindle, const IdentificationParameters& parameters);
 
@@ -41,6 +41,9 @@ class SteadyRecord {
   bool isCut() const { return condition_ && condition_->kind == CuttingCondition::Kind::cut; }
 
   std::size_t readings() const { return readings_.size(); }
+  /// Load samples of the test that are not numbers: the steady part ends there, and another begins after
+  /// them.
+  std::size_t unknown() const { return unknown_; }
   double firstStamp() const { return readings_.front().stamp; }  ///< [s] of the first of the readings
   /// Mean of the readings and force of the sensor since a stamp [s].
   LoadTest test(double since = -std::numeric_limits<double>::infinity()) const;
@@ -67,6 +70,7 @@ class SteadyRecord {
   double last_load_ = 0.0, last_state_ = 0.0;             // [s]
   std::vector<PathPoint> path_;                           // in a cut, or along its line in air
   std::vector<Sample> readings_;                          // of the load meter
+  std::size_t unknown_ = 0;                               // load samples of the test
   MotorRecord motor_;
   ForceRecord force_;
 };
