@@ -1,6 +1,7 @@
 // A program on the simulated mill, sent without a condition: program_node states the cuts, and the load meter
 // identifies the coefficients from them. A tooth that breaks in a further slot is reported.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -113,14 +114,18 @@ TEST(Program, OnePartGivesTheCoefficients) {
   std::set<std::string> missing;
   for (const auto& [node, topics] : inputs)
     for (const std::string& topic : topics) missing.insert(names::absolute(node) + names::absolute(topic));
+  double latency = 0.0;  // [s] the longest of all inputs
   const ros::Subscriber on_health = nh.subscribe<smartmill_msgs::NodeHealth>(
       names::NODE_HEALTH, 1000, boost::function<void(const smartmill_msgs::NodeHealth&)>([&](const auto& m) {
-        for (const auto& input : m.inputs)
+        for (const auto& input : m.inputs) {
           if (input.publishers > 0) missing.erase(m.node + input.topic);
+          latency = std::max(latency, input.latency);
+        }
       }));
   ASSERT_TRUE(wait([&] {
     return state.connected && diagnostics.count("parts begun") > 0 && missing.empty();
   })) << (missing.empty() ? "" : *missing.begin());
+  EXPECT_LT(latency, 1000.0);  // of a stamp before the first message of the clock: since 1970
 
   smartmill_msgs::ArmMotion arm;
   arm.request.arm = 1;
