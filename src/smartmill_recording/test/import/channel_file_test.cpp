@@ -170,7 +170,7 @@ TEST(DamagedFile, hdf5IsRefusedInOneLine) {
 
 TEST(DamagedFile, garbageOfAnyNameIsRefusedInOneLine) {
   const TemporaryFolder folder;
-  const std::string garbage("\x01\x02\x00\xFFgarbage\x00\x10 and more", 24);
+  const std::string garbage("\x01\x02\x00\xFFgarbage\x00\x10 and more", 22);
   for (const char* name : {"a.mat", "a.h5", "a.wav", "a.flac", "a.csv", "a.uff"}) {
     const std::string file = folder.write(name, garbage), line = errorOf([&] { readChannelFile(file); });
     EXPECT_EQ(line.rfind(file + ": ", 0), 0u) << line;
