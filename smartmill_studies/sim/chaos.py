@@ -83,10 +83,9 @@ class Faults:
 
     @staticmethod
     def starve(_, length):
-        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * os.cpu_count())]
-        time.sleep(length)
+        computing = f"import time\nend = time.monotonic() + {length}\nwhile time.monotonic() < end: pass"
+        busy = [subprocess.Popen([sys.executable, "-c", computing]) for _ in range(2 * os.cpu_count())]
         for process in busy:
-            process.kill()
             process.wait()
         return f"{length:.1f} s", None
 

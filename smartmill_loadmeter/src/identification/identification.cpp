@@ -111,9 +111,8 @@ void LoadMeterIdentification::closeTest() {
     return storeTest(steady_.test());
   const std::string unknown =
       steady_.unknown() > 0 ? " (" + countOf(steady_.unknown(), "load sample") + " not known)" : "";
-  session_.rejected.push_back("'" + steady_.condition()->name +
-                              "': " + countOf(steady_.readings(), "steady reading") + unknown +
-                              ", expected " + std::to_string(parameters_.minimum_readings) + " or more");
+  session_.reject("'" + steady_.condition()->name + "': " + countOf(steady_.readings(), "steady reading") +
+                  unknown + ", expected " + std::to_string(parameters_.minimum_readings) + " or more");
 }
 
 void LoadMeterIdentification::storeTest(LoadTest test) {
@@ -123,7 +122,7 @@ void LoadMeterIdentification::storeTest(LoadTest test) {
   for (std::size_t a = 0; test.motor && a < 3; ++a)
     test.motor->temperature[a] = temperature_.axis(a, began, test.stamp).value;
   const bool cut = test.isCut();
-  (cut ? session_.cuts : session_.air_cuts).push_back(test);
+  session_.add(test);
   std::optional<Estimate> torque;
   if (cut) {
     torque = torqueOf(test);

@@ -221,6 +221,20 @@ SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<Load
   return result;
 }
 
+void SessionTests::add(const LoadTest& test) {
+  std::vector<LoadTest>& tests = test.isCut() ? cuts : air_cuts;
+  if (tests.size() == MOST) {
+    tests.erase(tests.begin());
+    ++dropped;
+  }
+  tests.push_back(test);
+}
+
+void SessionTests::reject(const std::string& reason) {
+  if (rejected.size() == MOST) rejected.erase(rejected.begin());
+  rejected.push_back(reason);
+}
+
 IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& goal, const Spindle& spindle,
                                double spindle_uncertainty_percent, double largest_runout) {
   IdentifyResult result;
@@ -240,6 +254,7 @@ IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& 
     aside +=
         "; " + countOf(session.cuts.size() - cuts.size(), "cut") + " with another tool or material ignored";
   }
+  if (session.dropped > 0) aside += "; " + countOf(session.dropped, "older test") + " not kept";
   for (const std::string& reason : session.rejected) aside += "; " + reason;
   try {
     found = identifyFromTests(session.air_cuts, cuts, spindle, spindle_uncertainty_percent, largest_runout,

@@ -218,6 +218,25 @@ TEST(LoadMeterIdentification, resetDiscardsTestsAndWrongPlansAreNamed) {
   EXPECT_TRUE(std::isnan(r.coefficients.value.ktc));
 }
 
+TEST(SessionTests, TheNewestOfEachKindAreKept) {
+  SessionTests session;
+  LoadTest air, cut;
+  air.condition.kind = CuttingCondition::Kind::air;
+  cut.condition.kind = CuttingCondition::Kind::cut;
+  session.add(air);
+  for (std::size_t k = 0; k < SessionTests::MOST + 7; ++k) {
+    cut.stamp = static_cast<double>(k);
+    session.add(cut);
+    session.reject(std::to_string(k));
+  }
+  EXPECT_EQ(session.air_cuts.size(), 1u);
+  ASSERT_EQ(session.cuts.size(), SessionTests::MOST);
+  EXPECT_EQ(session.cuts.front().stamp, 7.0);
+  EXPECT_EQ(session.dropped, 7u);
+  ASSERT_EQ(session.rejected.size(), SessionTests::MOST);
+  EXPECT_EQ(session.rejected.front(), "7");
+}
+
 // A quarter of each second without load: as without a gap. No load at all: bad data.
 TEST(LoadMeterIdentification, loadsThatAreNotKnownAreLeftOut) {
   for (const double share : {0.0, 0.25, 1.0}) {

@@ -61,12 +61,18 @@ SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<Load
 /// For example "1 cut", "2 cuts".
 std::string countOf(std::size_t n, const char* what);
 
-/// Tests of a session.
+/// Tests since the last goal with reset, of which production without one has no end: the newest MOST of each
+/// kind.
 struct SessionTests {
+  static constexpr std::size_t MOST = 500;  ///< [1] of about 15 kB
+
   std::vector<LoadTest> air_cuts, cuts;
   std::vector<std::string> rejected;  ///< tests that are not used, each with the reason
   std::size_t unknown_loads = 0;      ///< load samples of the tests that are not numbers
+  std::size_t dropped = 0;            ///< older tests that are not kept
 
+  void add(const LoadTest& test);
+  void reject(const std::string& reason);
   void clear() { *this = {}; }
 };
 
