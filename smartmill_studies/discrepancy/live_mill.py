@@ -44,7 +44,7 @@ def discover(seed, folder):
     os.environ.update(ROS_HOME=str(folder / "ros_home"), ROS_HOSTNAME="localhost")
     with open(folder / "log.txt", "wb") as log:
         launch = subprocess.Popen(["roslaunch", "-p", str(free_port()), "smartmill_launch", "discover.launch", f"hidden:={hidden}", f"believed:={MODEL}",
-                                   f"folder:={out}", f"port:={free_port()}"], stdout=log, stderr=subprocess.STDOUT)
+                                   f"folder:={out}", f"port:={free_port()}", "record_after:=0.4"], stdout=log, stderr=subprocess.STDOUT)
         try:
             launch.wait(LONGEST)
         except subprocess.TimeoutExpired:
