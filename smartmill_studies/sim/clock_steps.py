@@ -20,7 +20,7 @@ import tempfile
 import threading
 import time
 
-from sensor_faults import free_port
+from production import free_port
 
 LIBRARY = "devel/lib/libsim_set_clock.so"  # set_clock.cpp
 PARAMETERS = "launch/test/short_session.yaml"

@@ -66,9 +66,9 @@ def unstored(database, cuts, faults):
         if whole != "ok":
             return ["database: " + whole], 0
         records = [stamp for (stamp,) in connection.execute("SELECT stamp FROM coefficients")]
+    unrecorded = [f for f in faults if f[2] in ("disconnect", "corrupt") or f[3] == "cnc" or f[2:] == ["kill", "loadmeter"]]
     wrong, owed = [], 0
     for begin, end in cuts:
-        unrecorded = [f for f in faults if f[2] in ("disconnect", "corrupt") or f[3] == "cnc" or f[2:] == ["kill", "loadmeter"]]
         if any(start < end + AFTER and until > begin - AFTER for start, until, *_ in unrecorded):
             continue
         owed += 1
@@ -120,19 +120,21 @@ class Parts:
                 self.part(self.next - 3).unlink()
             self.pending = None
         if self.part(self.next + 1).exists():
-            self.pending = self.process.submit(judge, self.part(self.next), self.part(self.next + 1), faults)
-            self.next += 1
+            self.submit(self.part(self.next + 1), faults)
+
+    def submit(self, following, faults):
+        self.pending = self.process.submit(judge, self.part(self.next), following, faults)
+        self.next += 1
 
     def finish(self, faults):
         """@return lost, samples, wrong blocks, judged blocks of the recording"""
-        while self.pending or self.part(self.next).exists():
+        while self.part(self.next).exists():
             if self.pending:
                 self.results.append(self.pending.result())
-            following = self.part(self.next + 1) if self.part(self.next + 1).exists() else None
-            self.pending = None
-            if self.part(self.next).exists():
-                self.pending = self.process.submit(judge, self.part(self.next), following, faults)
-                self.next += 1
+            following = self.part(self.next + 1)
+            self.submit(following if following.exists() else None, faults)
+        if self.pending:
+            self.results.append(self.pending.result())
         self.process.shutdown()
         lost = sorted({line for result in self.results for line in result[0]})
         return (lost, *(sum(result[k] for result in self.results) for k in (1, 2, 3)))

@@ -21,7 +21,7 @@ import time
 from judgement import percentile
 from master_restarts import wait
 from node_restarts import processes, usage
-from sensor_faults import free_port
+from production import free_port
 
 ALLOWED = 1.0  # [s]
 TRIALS = 30

@@ -19,8 +19,7 @@ import tempfile
 import time
 
 from judgement import account_of, percentile
-from production import Graph
-from sensor_faults import free_port
+from production import Graph, free_port
 
 LONGEST = 30.0  # [s]
 

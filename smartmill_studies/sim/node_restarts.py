@@ -18,7 +18,7 @@ import time
 
 from judgement import percentile
 from master_restarts import wait
-from sensor_faults import free_port
+from production import free_port
 
 LONGEST = 30.0  # [s]
 RUNNING = 0.6  # [s] at most between two kills: before and after its connections are complete

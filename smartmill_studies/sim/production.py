@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from xmlrpc.client import ServerProxy
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cnc"))
 import focas_wire  # noqa: E402
@@ -121,9 +122,9 @@ class Observer:
         self.heard, self.health, self.series = {}, {}, {}
         self.state, self.disarmed_since, self.force_status, self.force_at = None, None, None, 0.0
         self.finished, self.workpieces, self.sent_at, self.ran_at = 0, 1, None, 0.0
-        self.sent = None          # what was sent: kind, number of the slot, starts of loadmeter, stamp
+        self.sent = None          # what was sent: kind, whether it is a slot's first time, starts of loadmeter, stamp
         self.air_known_to = None  # starts of loadmeter that has measured an air cut
-        self.first_of = {}        # number of each slot that was sent: stamp at its first time
+        self.begun = 0            # slots that were sent once or more
         self.cuts = []            # finished slots, milled without interruption, of which loadmeter makes a record: stamps of begin and end
         self.client = actionlib.SimpleActionClient("/smartmill/cnc/run_program", RunProgramAction)
         self.arm_service = rospy.ServiceProxy("/smartmill/cnc/arm_motion", ArmMotion)
@@ -225,23 +226,24 @@ class Observer:
         # A slot that was not finished is milled again: the next level must not be twice as deep, which would chatter. As a part of it is cut, it has
         # no steady part.
         program, condition = slot(self.finished, kind)
-        if kind == CuttingCondition.CUT and self.finished in self.first_of:
+        first = kind == CuttingCondition.CUT and self.finished == self.begun
+        self.begun += first
+        if kind == CuttingCondition.CUT and not first:
             condition.steady_to = condition.steady_from
         goal = RunProgramGoal(name=condition.name, program=program, condition=condition)
         goal.header.stamp = goal.condition.header.stamp = now
-        self.sent, self.sent_at = (kind, self.finished, starts, now.to_sec()), time.monotonic()
-        self.first_of.setdefault(self.finished if kind == CuttingCondition.CUT else None, now.to_sec())
+        self.sent, self.sent_at = (kind, first, starts, now.to_sec()), time.monotonic()
         self.client.send_goal(goal)
 
     def finish(self, stamp):
         """The program that was sent has ended."""
         from smartmill_msgs.msg import CuttingCondition
-        kind, number, starts, begin = self.sent
+        kind, first, starts, begin = self.sent
         if kind == CuttingCondition.AIR:
             self.air_known_to = starts
             return
         self.finished += 1
-        if self.first_of[number] == begin and starts == self.starts_of("loadmeter"):
+        if first and starts == self.starts_of("loadmeter"):
             self.cuts.append((begin, stamp))
 
     def starts_of(self, node):
@@ -251,21 +253,21 @@ class Observer:
         health = self.health.get("/smartmill/" + node)
         return health.starts if health else 0
 
-    def process_of(self, node):
+    @staticmethod
+    def uri_of(node):
         import rosgraph
-        from xmlrpc.client import ServerProxy
+        return rosgraph.Master("/observer").lookupNode("/smartmill/" + node if node != "frames" else "/frames")
+
+    def process_of(self, node):
         try:
-            uri = rosgraph.Master("/observer").lookupNode("/smartmill/" + node if node != "frames" else "/frames")
-            return ServerProxy(uri).getPid("/observer")[2]
+            return ServerProxy(self.uri_of(node)).getPid("/observer")[2]
         except Exception:
             return None
 
     def ports_of(self, node):
         """Of its XML-RPC server and of its topics; empty: the node is not there"""
-        import rosgraph
-        from xmlrpc.client import ServerProxy
         try:
-            uri = rosgraph.Master("/observer").lookupNode("/smartmill/" + node if node != "frames" else "/frames")
+            uri = self.uri_of(node)
             topics = ServerProxy(uri).requestTopic("/observer", "/rosout", [["TCPROS"]])
             return [int(uri.rstrip("/").rsplit(":", 1)[1]), int(topics[2][2])]
         except Exception:

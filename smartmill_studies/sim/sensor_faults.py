@@ -16,12 +16,12 @@ import os
 import pathlib
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from production import ROOT, free_port
+
 LASTS = 4.0      # [s] of each fault
 PROMPT = 0.5     # [s] time in which a fault is to be announced
 WRONG = 0.05     # [1] difference of a result that counts as wrong
@@ -30,11 +30,6 @@ COMMON = ("off", "stuck", "garbage", "scale", "sign", "slow", "delayed", "interm
 FAULTS = [(DYNAMOMETER, fault) for fault in (*COMMON, "swapped", "wrong_rate")]
 FAULTS += [(ANGLE, fault) for fault in COMMON]
 FAULTS += [(HAMMER, fault) for fault in ("off", "stuck", "garbage", "intermittent", "duplicated", "wrong_rate")]
-
-
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as s:
-        return s.getsockname()[1]
 
 
 def launch(log, *arguments):

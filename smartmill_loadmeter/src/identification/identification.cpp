@@ -1,7 +1,6 @@
 #include "smartmill_loadmeter/identification/identification.h"
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/formatted.h"
 #include "smartmill_loadmeter/identification/idle_torque.h"
 
 namespace smartmill::loadmeter {

@@ -186,21 +186,18 @@ class Stream {
 
 using Streams = std::list<Stream>;
 
-// Stream of a connection of the present part: the newest of the same publisher in the earlier parts, or a new
-// one.
-Stream& streamOf(const RecordedConnection& connection, const std::map<std::uint32_t, Stream*>& present,
-                 Streams* streams, std::vector<StreamGap>* gaps, NodeAccounts* nodes) {
-  Stream begun(connection, gaps, nodes);
-  const StreamAccount sought = begun.account();
-  for (auto earlier = streams->rbegin(); earlier != streams->rend(); ++earlier) {
-    const StreamAccount found = earlier->account();
-    if (found.topic != sought.topic || found.publisher != sought.publisher) continue;
-    const bool continues = std::none_of(present.begin(), present.end(),
-                                        [&](const auto& one) { return one.second == &*earlier; });
-    if (continues) return *earlier;
-    break;
-  }
-  return streams->emplace_back(std::move(begun));
+using Publisher = std::pair<std::string, std::string>;  // of a topic
+
+Publisher publisherOf(const Stream& stream) {
+  const StreamAccount account = stream.account();
+  return {account.topic, account.publisher};
+}
+
+// The newest stream of each publisher: it continues in the next part.
+std::map<Publisher, Stream*> newestOf(Streams& streams) {
+  std::map<Publisher, Stream*> newest;
+  for (Stream& stream : streams) newest[publisherOf(stream)] = &stream;
+  return newest;
 }
 
 // The sensor whose running index the forces have: of those recorded the one with most samples of them.
@@ -256,6 +253,7 @@ RecordingAccount accountOf(const std::vector<std::string>& parts,
   NodeAccounts nodes;
   for (std::size_t part = 0; part < parts.size(); ++part) {
     const std::unique_ptr<RecordingFile> file = openRecording(parts[part]);
+    std::map<Publisher, Stream*> earlier = newestOf(streams);
     std::map<std::uint32_t, Stream*> of_connection;
     RecordingFile::Entry entry;
     for (std::uint64_t count = 0; file->next(&entry); ++count) {
@@ -263,7 +261,11 @@ RecordingAccount accountOf(const std::vector<std::string>& parts,
         progress((static_cast<double>(part) + file->share()) / static_cast<double>(parts.size()));
       const RecordedConnection& connection = file->connection(entry);
       Stream*& stream = of_connection[entry.connection];
-      if (!stream) stream = &streamOf(connection, of_connection, &streams, &result.gaps, &nodes);
+      if (!stream) {
+        Stream begun(connection, &result.gaps, &nodes);
+        const auto continued = earlier.extract(publisherOf(begun));
+        stream = continued ? continued.mapped() : &streams.emplace_back(std::move(begun));
+      }
       try {
         stream->add(file->data(entry), entry.size);
       } catch (const Error& error) {
