@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 
@@ -51,26 +52,46 @@ struct CurveModel {
 template <class Visit>
 void eachEdge(double angle, const CurveModel& model, const Engagement& e, Visit visit) {
   const int slices = model.tool.lag() == 0.0 ? 1 : model.options.edge_slices;
-  const double dz = e.axial_depth / slices;
+  const double dz = e.axial_depth / slices, lag = model.tool.lag() * dz;
+  const double lag_sine = std::sin(lag), lag_cosine = std::cos(lag);
   for (int tooth = 0; tooth < model.tool.teeth; ++tooth) {
+    double phi = wrapped(angle + model.angle_offset + model.tool.toothAngle(tooth) - 0.5 * lag);
+    double sine = std::sin(phi), cosine = std::cos(phi);
     for (int slice = 0; slice < slices; ++slice) {
-      double phi = std::fmod(
-          angle + model.angle_offset + model.tool.toothAngle(tooth) - model.tool.lag() * dz * (slice + 0.5),
-          units::TWO_PI);
-      if (phi < 0.0) phi += units::TWO_PI;
-      if (phi <= e.entry || phi >= e.exit) continue;
-      const double chip =
-          e.feed_per_tooth * std::sin(phi) + model.chip_offset[static_cast<std::size_t>(tooth)];
-      if (chip > 0.0) visit(tooth, std::sin(phi), std::cos(phi), chip, dz);
+      const double chip = e.feed_per_tooth * sine + model.chip_offset[static_cast<std::size_t>(tooth)];
+      if (phi > e.entry && phi < e.exit && chip > 0.0) visit(tooth, sine, cosine, chip, dz);
+      phi = wrapped(phi - lag);
+      const double next = sine * lag_cosine - cosine * lag_sine;
+      cosine = cosine * lag_cosine + sine * lag_sine;
+      sine = next;
     }
   }
 }
+
+/// The splines of a chip thickness; linear beyond the thickest chip.
+struct Splines {
+  std::array<double, 4> value{}, slope{};
+  int first = 0;
+
+  Splines(double chip, const CurveModel& model) {
+    value = cubicSplines(std::min(chip, model.top), model.top, model.pieces, first, &slope);
+    if (chip <= model.top) return;
+    for (std::size_t k = 0; k < 4; ++k) value[k] += slope[k] * (chip - model.top);
+  }
+  double sum(const std::array<double, 4>& factors, const ForceCurve& curve) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 4; ++k) sum += factors[k] * curve.value[static_cast<std::size_t>(first) + k];
+    return sum;
+  }
+};
 
 /// Force by the curves of the previous iteration [N].
 std::array<double, 2> modelForce(double angle, const CurveModel& model, const Engagement& e) {
   std::array<double, 2> force{};
   eachEdge(angle, model, e, [&](int, double s, double c, double chip, double dz) {
-    const double t = dz * model.curves.tangential.at(chip), r = dz * model.curves.radial.at(chip);
+    const Splines splines(chip, model);
+    const double t = dz * splines.sum(splines.value, model.curves.tangential);
+    const double r = dz * splines.sum(splines.value, model.curves.radial);
     force[0] -= t * c + r * s;
     force[1] += t * s - r * c;
   });
@@ -87,23 +108,18 @@ bool rowsAt(double angle, const CurveModel& model, const Engagement& e, Eigen::R
   const bool slopes = !model.curves.tangential.value.empty();
   eachEdge(angle, model, e, [&](int tooth, double s, double c, double chip, double dz) {
     cuts = true;
-    int first = 0;
-    auto b = cubicSplines(std::min(chip, model.top), model.top, model.pieces, first);
-    if (chip > model.top) {  // linear extrapolation by the last two coefficients
-      const double slope_step = 3.0 * model.pieces / model.top * (chip - model.top);
-      b[2] -= slope_step;
-      b[3] += slope_step;
-    }
+    const Splines splines(chip, model);
+    const int first = splines.first;
     for (int k = 0; k < 4; ++k) {
-      const double share = dz * b[static_cast<std::size_t>(k)];
+      const double share = dz * splines.value[static_cast<std::size_t>(k)];
       x(first + k) -= share * c;
       x(n + first + k) -= share * s;
       y(first + k) += share * s;
       y(n + first + k) -= share * c;
     }
     if (!slopes) return;
-    const double t = dz * model.curves.tangential.slope(chip) / model.slope;
-    const double r = dz * model.curves.radial.slope(chip) / model.slope;
+    const double t = dz * splines.sum(splines.slope, model.curves.tangential) / model.slope;
+    const double r = dz * splines.sum(splines.slope, model.curves.radial) / model.slope;
     x(model.offsetsBegin() + tooth) -= t * c + r * s;
     y(model.offsetsBegin() + tooth) += t * s - r * c;
   });

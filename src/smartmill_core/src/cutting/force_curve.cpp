@@ -37,10 +37,12 @@ ForceCurve curveOf(const StrictYaml& yaml, double top) {
 
 }  // namespace
 
-std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first) {
+std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first,
+                                   std::array<double, 4>* slopes) {
   const auto knot = [&](int k) { return top * std::clamp(k - 3, 0, pieces) / pieces; };
   first = std::clamp(static_cast<int>(x / top * pieces), 0, pieces - 1);
   std::array<double, 4> b{1.0, 0.0, 0.0, 0.0};
+  if (slopes != nullptr) *slopes = {};
   for (int degree = 1; degree <= 3; ++degree) {  // Cox and de Boor
     double saved = 0.0;
     for (int r = 0; r < degree; ++r) {
@@ -48,6 +50,9 @@ std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first)
       const double share = b[static_cast<std::size_t>(r)] / (right + left);
       b[static_cast<std::size_t>(r)] = saved + right * share;
       saved = left * share;
+      if (slopes == nullptr || degree < 3) continue;
+      (*slopes)[static_cast<std::size_t>(r)] -= 3.0 * share;
+      (*slopes)[static_cast<std::size_t>(r) + 1] += 3.0 * share;
     }
     b[static_cast<std::size_t>(degree)] = saved;
   }
@@ -66,8 +71,13 @@ double ForceCurve::at(double chip) const {
 }
 
 double ForceCurve::slope(double chip) const {
-  const double top = knots.back(), step = 1e-4 * top, x = std::clamp(chip, step, top - step);
-  return (at(x + step) - at(x - step)) / (2.0 * step);
+  int first = 0;
+  std::array<double, 4> slopes{};
+  cubicSplines(std::clamp(chip, 0.0, knots.back()), knots.back(), static_cast<int>(knots.size()) - 1, first,
+               &slopes);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < 4; ++k) sum += slopes[k] * value[static_cast<std::size_t>(first) + k];
+  return sum;
 }
 
 double ForceCurve::stdAt(double chip) const {

@@ -7,9 +7,11 @@
 namespace smartmill {
 
 /// Cubic B-splines over even breaks from 0 to top with triple knots at the ends: pieces + 3 of them.
+/// @param slopes if given, gets their derivatives by x
 /// @return the values of the four splines that are nonzero at x (0..top); `first` is the index of the first
 /// of them
-std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first);
+std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first,
+                                   std::array<double, 4>* slopes = nullptr);
 
 /// Force per depth of cut over chip thickness as a monotone cubic spline: its coefficients never decrease
 /// (Bachrathy and Stepan, section 4, determine it point by point with one tooth in the cut).
