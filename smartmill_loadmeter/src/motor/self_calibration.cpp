@@ -29,6 +29,7 @@ void SelfCalibration::clear() {
 }
 
 void SelfCalibration::air(const MotorMeasurement& measurement, double stamp) {
+  if (air_.size() == MOST) air_.erase(air_.begin());
   air_.push_back({measurement, stamp});
   for (std::size_t a = 0; a < 3; ++a) {
     if (measurement.range[a]) updateFriction(a);
@@ -58,6 +59,7 @@ void SelfCalibration::updateFriction(std::size_t axis) {
 }
 
 void SelfCalibration::cut(const MotorMeasurement& measurement, const ForceEstimate& reference) {
+  if (cuts_.size() == MOST) cuts_.erase(cuts_.begin());
   cuts_.push_back({measurement, reference});
   calibrate();
 }

@@ -104,25 +104,30 @@ TEST(DriveResponse, scatterIncreasesTheStandardDeviation) {
   EXPECT_THROW(weightedMean({}), Error);
 }
 
+/// A slide of 200 N/A along +X. @param velocity [m/s], force [N]
+MotorMeasurement slideCurrent(double velocity, double force) {
+  MotorMeasurement r;
+  r.velocity[0] = velocity;
+  r.range[0] = (150.0 + 600.0 * velocity + force) / 200.0;
+  r.spindle_speed = 400.0;
+  return r;
+}
+
+ForceEstimate dynamometer(double force) {
+  ForceEstimate reference;
+  reference.mean[0] = {-force, 0.02 * force};
+  return reference;
+}
+
 // Slots along +X with forces by a dynamometer; feeds of the air moves between those of the cuts.
 TEST(SelfCalibration, identifiesFrictionAndConstantFromOwnMovesAndCuts) {
   MotorParameters parameters;
   parameters.phase_per_metre = {PER_METRE, 0.0, 0.0};
   SelfCalibration self(parameters);
-  const auto reading = [](double velocity, double force) {
-    MotorMeasurement r;
-    r.velocity[0] = velocity;
-    r.range[0] = (150.0 + 600.0 * velocity + force) / 200.0;
-    r.spindle_speed = 400.0;
-    return r;
-  };
-  for (const double v : {0.004, 0.013, 0.027, 0.053}) self.air(reading(v, 0.0), 100.0 * v);
+  for (const double v : {0.004, 0.013, 0.027, 0.053}) self.air(slideCurrent(v, 0.0), 100.0 * v);
   EXPECT_FALSE(self.calibration());
-  for (const double force : {60.0, 100.0, 140.0}) {
-    ForceEstimate reference;
-    reference.mean[0] = {-force, 0.02 * force};
-    self.cut(reading(0.016 + 5e-5 * force, force), reference);
-  }
+  for (const double force : {60.0, 100.0, 140.0})
+    self.cut(slideCurrent(0.016 + 5e-5 * force, force), dynamometer(force));
   ASSERT_TRUE(self.calibration() && self.calibration()->drive[0]);
   const DriveCalibration& drive = *self.calibration()->drive[0];
   EXPECT_NEAR(drive.newton_per_ampere.value, 200.0, 1e-3 * 200.0);
@@ -131,6 +136,27 @@ TEST(SelfCalibration, identifiesFrictionAndConstantFromOwnMovesAndCuts) {
   EXPECT_NE(self.text({}).find("X 200.0 +- 4.0 N/A from 3 cuts"), std::string::npos) << self.text({});
   self.clear();
   EXPECT_FALSE(self.calibration());
+}
+
+// A drive whose constant was changed: after MOST further tests nothing is left of the old ones.
+TEST(SelfCalibration, keepsTheNewestTests) {
+  MotorParameters parameters;
+  parameters.phase_per_metre = {PER_METRE, 0.0, 0.0};
+  SelfCalibration self(parameters);
+  const auto test = [&self](double newton_per_ampere, std::size_t k) {
+    for (const double force : {0.0, 60.0 + 0.4 * static_cast<double>(k)}) {
+      MotorMeasurement r = slideCurrent(0.004 + 2e-4 * static_cast<double>(k), force);
+      r.range[0] = *r.range[0] * 200.0 / newton_per_ampere;
+      if (force > 0.0) self.cut(r, dynamometer(force));
+      if (force == 0.0) self.air(r, 100.0 * static_cast<double>(k));
+    }
+  };
+  for (std::size_t k = 0; k < 20; ++k) test(200.0, k);
+  EXPECT_NEAR(self.calibration()->drive[0]->newton_per_ampere.value, 200.0, 0.2);
+  for (std::size_t k = 0; k < SelfCalibration::MOST; ++k) test(250.0, k);
+  const DriveCalibration& drive = *self.calibration()->drive[0];
+  EXPECT_NEAR(drive.newton_per_ampere.value, 250.0, 0.25);
+  EXPECT_EQ(drive.cuts, static_cast<int>(SelfCalibration::MOST));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,9 +15,12 @@ namespace smartmill::loadmeter {
 
 /// Calibration of the drives by a session's own air moves and cuts, without standard cuts: friction of each
 /// axis over velocity, and force and torque per ampere from cuts whose force another sensor measured
-/// (dynamometer, spindle sensor; or the load meter alone, with its larger uncertainty).
+/// (dynamometer, spindle sensor; or the load meter alone, with its larger uncertainty). The newest MOST
+/// tests in air and MOST cuts count: production has no end, and each cut is compared with all tests in air.
 class SelfCalibration {
  public:
+  static constexpr std::size_t MOST = 100;  ///< [1]
+
   explicit SelfCalibration(const MotorParameters& parameters) : parameters_(parameters) {}
   void clear();
 
