@@ -68,30 +68,13 @@ void eachEdge(double angle, const CurveModel& model, const Engagement& e, Visit 
   }
 }
 
-/// The splines of a chip thickness; linear beyond the thickest chip.
-struct Splines {
-  std::array<double, 4> value{}, slope{};
-  int first = 0;
-
-  Splines(double chip, const CurveModel& model) {
-    value = cubicSplines(std::min(chip, model.top), model.top, model.pieces, first, &slope);
-    if (chip <= model.top) return;
-    for (std::size_t k = 0; k < 4; ++k) value[k] += slope[k] * (chip - model.top);
-  }
-  double sum(const std::array<double, 4>& factors, const ForceCurve& curve) const {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < 4; ++k) sum += factors[k] * curve.value[static_cast<std::size_t>(first) + k];
-    return sum;
-  }
-};
-
 /// Force by the curves of the previous iteration [N].
 std::array<double, 2> modelForce(double angle, const CurveModel& model, const Engagement& e) {
   std::array<double, 2> force{};
   eachEdge(angle, model, e, [&](int, double s, double c, double chip, double dz) {
-    const Splines splines(chip, model);
-    const double t = dz * splines.sum(splines.value, model.curves.tangential);
-    const double r = dz * splines.sum(splines.value, model.curves.radial);
+    const CubicSplines splines(chip, model.top, model.pieces);
+    const double t = dz * splines.valueOf(model.curves.tangential.value);
+    const double r = dz * splines.valueOf(model.curves.radial.value);
     force[0] -= t * c + r * s;
     force[1] += t * s - r * c;
   });
@@ -108,7 +91,7 @@ bool rowsAt(double angle, const CurveModel& model, const Engagement& e, Eigen::R
   const bool slopes = !model.curves.tangential.value.empty();
   eachEdge(angle, model, e, [&](int tooth, double s, double c, double chip, double dz) {
     cuts = true;
-    const Splines splines(chip, model);
+    const CubicSplines splines(chip, model.top, model.pieces);
     const int first = splines.first;
     for (int k = 0; k < 4; ++k) {
       const double share = dz * splines.value[static_cast<std::size_t>(k)];
@@ -118,8 +101,8 @@ bool rowsAt(double angle, const CurveModel& model, const Engagement& e, Eigen::R
       y(n + first + k) -= share * c;
     }
     if (!slopes) return;
-    const double t = dz * splines.sum(splines.slope, model.curves.tangential) / model.slope;
-    const double r = dz * splines.sum(splines.slope, model.curves.radial) / model.slope;
+    const double t = dz * splines.slopeOf(model.curves.tangential.value) / model.slope;
+    const double r = dz * splines.slopeOf(model.curves.radial.value) / model.slope;
     x(model.offsetsBegin() + tooth) -= t * c + r * s;
     y(model.offsetsBegin() + tooth) += t * s - r * c;
   });
@@ -360,11 +343,10 @@ void addDeviations(const CurveModel& model, const Eigen::MatrixXd& covariance, F
   for (int component = 0; component < 2; ++component) {
     ForceCurve& curve = component == 0 ? curves.tangential : curves.radial;
     for (const double chip : curve.knots) {
-      int first = 0;
-      const auto b = cubicSplines(chip, model.top, model.pieces, first);
+      const CubicSplines splines(chip, model.top, model.pieces);
       Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(model.unknowns());
       for (int i = 0; i < 4; ++i)
-        row(component * model.curveSize() + first + i) = b[static_cast<std::size_t>(i)];
+        row(component * model.curveSize() + splines.first + i) = splines.value[static_cast<std::size_t>(i)];
       toIncrements(row, model.curveSize());
       curve.std_dev.push_back(std::sqrt(std::max(0.0, (row * covariance * row.transpose())(0))));
     }

@@ -35,49 +35,54 @@ ForceCurve curveOf(const StrictYaml& yaml, double top) {
   return curve;
 }
 
+double sumOf(const std::array<double, 4>& splines, int first, const std::vector<double>& coefficients) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < 4; ++k) sum += splines[k] * coefficients[static_cast<std::size_t>(first) + k];
+  return sum;
+}
+
+CubicSplines splinesAt(double chip, const std::vector<double>& knots) {
+  return {chip, knots.back(), static_cast<int>(knots.size()) - 1};
+}
+
 }  // namespace
 
-std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first,
-                                   std::array<double, 4>* slopes) {
+CubicSplines::CubicSplines(double x, double top, int pieces)
+    : first(std::clamp(static_cast<int>(x / top * pieces), 0, pieces - 1)) {
   const auto knot = [&](int k) { return top * std::clamp(k - 3, 0, pieces) / pieces; };
-  first = std::clamp(static_cast<int>(x / top * pieces), 0, pieces - 1);
-  std::array<double, 4> b{1.0, 0.0, 0.0, 0.0};
-  if (slopes != nullptr) *slopes = {};
-  for (int degree = 1; degree <= 3; ++degree) {  // Cox and de Boor
+  const double inside = std::clamp(x, 0.0, top);
+  value[0] = 1.0;
+  for (std::size_t degree = 1; degree <= 3; ++degree) {  // Cox and de Boor
     double saved = 0.0;
-    for (int r = 0; r < degree; ++r) {
-      const double right = knot(first + 3 + r + 1) - x, left = x - knot(first + 3 + 1 - degree + r);
-      const double share = b[static_cast<std::size_t>(r)] / (right + left);
-      b[static_cast<std::size_t>(r)] = saved + right * share;
+    for (std::size_t r = 0; r < degree; ++r) {
+      const int at = first + 3 + static_cast<int>(r);
+      const double right = knot(at + 1) - inside, left = inside - knot(at + 1 - static_cast<int>(degree));
+      const double share = value[r] / (right + left);
+      value[r] = saved + right * share;
       saved = left * share;
-      if (slopes == nullptr || degree < 3) continue;
-      (*slopes)[static_cast<std::size_t>(r)] -= 3.0 * share;
-      (*slopes)[static_cast<std::size_t>(r) + 1] += 3.0 * share;
+      if (degree < 3) continue;
+      slope[r] -= 3.0 * share;
+      slope[r + 1] += 3.0 * share;
     }
-    b[static_cast<std::size_t>(degree)] = saved;
+    value[degree] = saved;
   }
-  return b;
+  for (std::size_t k = 0; k < 4; ++k) value[k] += slope[k] * (x - inside);
+}
+
+double CubicSplines::valueOf(const std::vector<double>& coefficients) const {
+  return sumOf(value, first, coefficients);
+}
+
+double CubicSplines::slopeOf(const std::vector<double>& coefficients) const {
+  return sumOf(slope, first, coefficients);
 }
 
 double ForceCurve::at(double chip) const {
-  if (!(chip > 0.0)) return 0.0;
-  const double top = knots.back();
-  if (chip > top) return at(top) + slope(top) * (chip - top);
-  int first = 0;
-  const auto b = cubicSplines(chip, top, static_cast<int>(knots.size()) - 1, first);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < 4; ++k) sum += b[k] * value[static_cast<std::size_t>(first) + k];
-  return sum;
+  return chip > 0.0 ? splinesAt(chip, knots).valueOf(value) : 0.0;
 }
 
 double ForceCurve::slope(double chip) const {
-  int first = 0;
-  std::array<double, 4> slopes{};
-  cubicSplines(std::clamp(chip, 0.0, knots.back()), knots.back(), static_cast<int>(knots.size()) - 1, first,
-               &slopes);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < 4; ++k) sum += slopes[k] * value[static_cast<std::size_t>(first) + k];
-  return sum;
+  return splinesAt(chip, knots).slopeOf(value);
 }
 
 double ForceCurve::stdAt(double chip) const {

@@ -1,7 +1,6 @@
 #include "smartmill_core/cutting/force_curve.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -22,16 +21,14 @@ double abscissa(int k) {
 TEST(CubicSplines, AddUpToOneAndToAStraightLineOfSlopeOne) {
   for (int i = 0; i <= 1000; ++i) {
     const double x = TOP * i / 1000.0;
-    int first = 0;
-    std::array<double, 4> slopes{};
-    const auto value = cubicSplines(x, TOP, PIECES, first, &slopes);
+    const CubicSplines splines(x, TOP, PIECES);
     double sum = 0.0, line = 0.0, flat = 0.0, slope = 0.0;
     for (int k = 0; k < 4; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      sum += value[at];
-      line += value[at] * abscissa(first + k);
-      flat += slopes[at] * TOP;
-      slope += slopes[at] * abscissa(first + k);
+      sum += splines.value[at];
+      line += splines.value[at] * abscissa(splines.first + k);
+      flat += splines.slope[at] * TOP;
+      slope += splines.slope[at] * abscissa(splines.first + k);
     }
     EXPECT_NEAR(sum, 1.0, 1e-14);
     EXPECT_NEAR(line, x, 1e-14 * TOP);

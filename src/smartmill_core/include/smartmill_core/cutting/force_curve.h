@@ -6,12 +6,16 @@
 
 namespace smartmill {
 
-/// Cubic B-splines over even breaks from 0 to top with triple knots at the ends: pieces + 3 of them.
-/// @param slopes if given, gets their derivatives by x
-/// @return the values of the four splines that are nonzero at x (0..top); `first` is the index of the first
-/// of them
-std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first,
-                                   std::array<double, 4>* slopes = nullptr);
+/// The four cubic B-splines that are nonzero at x, over even breaks from 0 to top with triple knots at the
+/// ends: pieces + 3 of them. Linear outside 0..top.
+struct CubicSplines {
+  CubicSplines(double x, double top, int pieces);
+
+  int first = 0;                                                  ///< index of the first of them
+  std::array<double, 4> value{}, slope{};                         ///< [1], [1/unit of x]
+  double valueOf(const std::vector<double>& coefficients) const;  ///< of the curve with these coefficients
+  double slopeOf(const std::vector<double>& coefficients) const;
+};
 
 /// Force per depth of cut over chip thickness as a monotone cubic spline: its coefficients never decrease
 /// (Bachrathy and Stepan, section 4, determine it point by point with one tooth in the cut).
