@@ -154,7 +154,7 @@ class Faults:
 def run(seed, arguments):
     """One run. @return its figures"""
     folder = pathlib.Path(tempfile.mkdtemp(prefix=f"chaos_{seed}_"))
-    graph, parts = Graph(folder, arguments.pace), Parts(folder / "run.bag")
+    graph, parts = Graph(folder, arguments.pace, faults=not arguments.without_faults), Parts(folder / "run.bag")
     result = {"seed": seed, "faults": [], "recovery": [], "violations": []}
     try:
         observer = Observer()

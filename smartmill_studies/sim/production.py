@@ -22,7 +22,7 @@ COMPENSATED, PASSED_THROUGH, TRANSIENT = 1, 2, 4  # ForceBlock.status
 LIMITS = {"X": 0.25, "Y": 0.2, "Z": 0.3}  # [m] travel of launch/models/mill.yaml, to both sides; Z to 0
 LANES, LEVELS = 9, 39   # of slots in the stock of mill_twin.yaml
 STEADY_PATH = 0.13      # [m] to both sides of the middle of the stock
-DISK_MB = 64            # file system of database and logs
+DISK_MB = 256           # file system of database and logs
 OWN_MOUNTS = "SMARTMILL_OWN_MOUNTS"  # set to 1: this process may mount file systems that others do not see
 
 
@@ -70,8 +70,8 @@ class Disk:
 class Graph:
     """The pipeline in a process group of its own."""
 
-    def __init__(self, folder, pace, port=None):
-        """@param port of a master that runs; None: roslaunch starts one"""
+    def __init__(self, folder, pace, port=None, faults=True):
+        """@param port of a master that runs; None: roslaunch starts one. @param faults whether the streams pass through fault_node"""
         self.folder = folder
         self.disk = Disk(folder / "disk")
         self.controller = free_port()
@@ -79,8 +79,8 @@ class Graph:
         self.master = f"http://localhost:{port or free_port()}"
         os.environ.update(ROS_MASTER_URI=self.master, ROS_HOSTNAME="localhost", ROS_HOME=str(self.disk.folder / "home"))
         arguments = ["smartmill_launch", "pipeline.launch", f"pace:={pace}", f"machine:={ROOT / 'launch/models/mill_twin.yaml'}", f"port:={self.controller}",
-                     f"bridge_port:={self.proxy.port}", f"bag:={folder / 'run.bag'}", f"database:={self.disk.folder / 'machine.sqlite'}", "faults:=true",
-                     f"fault_topics:={' '.join(STREAMS)}", f"motion_log:={self.disk.folder / 'motion.log'}"]
+                     f"bridge_port:={self.proxy.port}", f"bag:={folder / 'run.bag'}", f"database:={self.disk.folder / 'machine.sqlite'}",
+                     f"faults:={str(faults).lower()}", f"fault_topics:={' '.join(STREAMS)}", f"motion_log:={self.disk.folder / 'motion.log'}"]
         self.log = open(folder / "log.txt", "wb")
         self.launch = subprocess.Popen(["roslaunch", "-p", self.master.rsplit(":", 1)[1], *arguments], stdout=self.log, stderr=subprocess.STDOUT,
                                        start_new_session=True)
