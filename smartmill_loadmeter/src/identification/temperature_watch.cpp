@@ -11,7 +11,7 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr double KEPT = 86400.0;          // [s] history: longer than a session
+constexpr double KEPT = 14400.0;          // [s] history: longer than a cut
 constexpr double ROTATING = 1.0;          // [rad/s] spindle speed above which it heats its motor
 constexpr double LONGEST_INTERVAL = 1.0;  // [s] between two loads that belong together
 

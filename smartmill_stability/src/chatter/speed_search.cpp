@@ -1,9 +1,8 @@
 #include "smartmill_stability/chatter/speed_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <complex>
-#include <limits>
 #include <random>
 #include <utility>
 
@@ -11,16 +10,102 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/learning/evidence.h"
+#include "smartmill_stability/solvers/zero_order.h"
 
 namespace smartmill::stability {
 namespace {
 
 constexpr double SPEED_STEP = 0.01;  // [1] between speeds of the grid: stable pockets are wider
-constexpr std::size_t LINES = 240;   // frequencies of a machine, dense around its modes
-constexpr double RULE =
-    0.1;  // [1] weight of the rule next to the drawn machines, which may not contain the true one
-constexpr double BACKWARDS = 0.1, SAME_BENDING = 0.9, OTHER_MODE = 0.5;  // [1] probabilities
+constexpr int LINES = 60;            // frequencies around each mode
+constexpr double OTHER_DIRECTION = 0.9, OTHER_MODE = 0.5;  // [1] probabilities
+// [1] Weight of the rule next to the drawn machines, which may not contain the true one.
+constexpr double RULE = 0.1;
 constexpr double NEARLY = 0.95;  // [1] of the largest probability: the faster speed removes more
+
+double logUniform(double low, double high, std::mt19937_64& random) {
+  return low * std::pow(high / low, std::uniform_real_distribution<double>()(random));
+}
+
+/// Up- or down-milling with an arc of 27 to 180 degrees, fed along x or y. Speeds are those of the tooth
+/// passing, and the unit of the limit is arbitrary.
+RegenerativeProcess drawProcess(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit;
+  RegenerativeProcess process;
+  process.teeth = 1;
+  process.kt = 1.0;
+  process.radial_ratio = 0.1 + 0.6 * unit(random);
+  const double arc = units::PI * std::min(1.0, 0.15 + unit(random));
+  const bool down = unit(random) < 0.5, along_y = unit(random) < 0.5;
+  process.entry = (down ? units::PI - arc : 0.0) + (along_y ? 0.5 * units::PI : 0.0);
+  process.exit = process.entry + arc;
+  return process;
+}
+
+/// Frequency of a mode relative to the first one: log-uniform, but half of the draws are near another chatter
+/// frequency that was heard.
+class OtherFrequency {
+ public:
+  OtherFrequency(const std::vector<HeardCut>& cuts, double spread) : spread_(spread) {
+    for (std::size_t k = 1; k < cuts.size(); ++k)
+      if (cuts[k].frequency) heard_.push_back(std::log(*cuts[k].frequency / *cuts.front().frequency));
+  }
+  /// @param weight multiplied by the log-uniform density over that of the draw
+  double draw(std::mt19937_64& random, double& weight) const {
+    constexpr double LOW = 0.4, HIGH = 3.0;
+    if (heard_.empty()) return logUniform(LOW, HIGH, random);
+    std::normal_distribution<double> near(0.0, spread_);
+    std::uniform_int_distribution<std::size_t> any(0, heard_.size() - 1);
+    const double f = std::bernoulli_distribution()(random) ? heard_[any(random)] + near(random)
+                                                           : std::log(logUniform(LOW, HIGH, random));
+    double density = 0.0;
+    for (const double h : heard_)
+      density += std::exp(-0.5 * std::pow((f - h) / spread_, 2)) / (spread_ * std::sqrt(units::TWO_PI)) /
+                 static_cast<double>(heard_.size());
+    const bool possible = f >= std::log(LOW) && f <= std::log(HIGH);
+    const double prior = possible ? 1.0 / std::log(HIGH / LOW) : 0.0;
+    weight *= prior / (0.5 * prior + 0.5 * density);
+    return std::exp(f);
+  }
+
+ private:
+  double spread_;              // [1] of a frequency
+  std::vector<double> heard_;  // logarithms of the ratios
+};
+
+/// Receptances over the frequency relative to that of the first mode, on lines dense around the modes.
+/// @param weight multiplied by that of the draw
+ToolTipResponse drawResponse(const SpeedSearchOptions& options, const OtherFrequency& others,
+                             std::mt19937_64& random, double& weight) {
+  std::uniform_real_distribution<double> unit;
+  std::array<ModalModel, 2> axes;
+  const auto add = [&](std::size_t axis, double frequency, double gain) {
+    Mode mode;
+    mode.frequency = frequency;
+    mode.damping_ratio = logUniform(options.low_damping, options.high_damping, random);
+    mode.gain = gain;
+    axes[axis].modes.push_back(mode);
+  };
+  add(0, 1.0, 1.0);
+  if (unit(random) < OTHER_DIRECTION) add(1, logUniform(0.8, 1.25, random), logUniform(0.2, 5.0, random));
+  for (int other = 0; other < 2; ++other)
+    if (unit(random) < OTHER_MODE)
+      add(unit(random) < 0.5 ? 0 : 1, others.draw(random, weight), logUniform(0.05, 1.0, random));
+  ToolTipResponse response;
+  for (const ModalModel& axis : axes)
+    for (const Mode& mode : axis.modes)
+      for (int k = 0; k < LINES; ++k) {
+        // Quantiles of a Cauchy distribution about the mode, as wide as its resonance and wider.
+        const double share = (k + 0.5) / LINES - 0.5;
+        const double f = mode.frequency * (1.0 + 1.5 * mode.damping_ratio * std::tan(units::PI * share));
+        if (f > 0.3 * mode.frequency && f < 3.0 * mode.frequency) response.frequency.push_back(f);
+      }
+  std::sort(response.frequency.begin(), response.frequency.end());
+  for (const double f : response.frequency) {
+    response.xx.push_back(axes[0].response(f));
+    response.yy.push_back(axes[1].response(f));
+  }
+  return response;
+}
 
 }  // namespace
 
@@ -29,16 +114,15 @@ SpeedSearch::SpeedSearch(int teeth, double low, double high, const SpeedSearchOp
   if (teeth < 1 || teeth > 40) throw Error(formatted("speed search: %d teeth: expected 1 to 40", teeth));
   if (!(low > 0.0) || !(high > low) || !std::isfinite(high))
     throw Error(formatted("speed search: speeds %g to %g rad/s: expected 0 < low < high", low, high));
-  speeds_ = 1 + static_cast<std::size_t>(std::ceil(std::log(high / low) / std::log1p(SPEED_STEP)));
-}
-
-double SpeedSearch::speedAt(std::size_t k) const {
-  return low_ * std::pow(high_ / low_, static_cast<double>(k) / static_cast<double>(speeds_ - 1));
+  const auto steps = static_cast<std::size_t>(std::ceil(std::log(high / low) / std::log1p(SPEED_STEP)));
+  for (std::size_t k = 0; k <= steps; ++k)
+    speeds_.push_back(low * std::pow(high / low, static_cast<double>(k) / static_cast<double>(steps)));
 }
 
 std::size_t SpeedSearch::nearest(double speed) const {
-  const double at = std::log(speed / low_) / std::log(high_ / low_) * static_cast<double>(speeds_ - 1);
-  return static_cast<std::size_t>(std::lround(std::clamp(at, 0.0, static_cast<double>(speeds_ - 1))));
+  const auto last = static_cast<double>(speeds_.size() - 1);
+  const double at = std::log(speed / low_) / std::log(high_ / low_) * last;
+  return static_cast<std::size_t>(std::lround(std::clamp(at, 0.0, last)));
 }
 
 /// Machines that chatter in the first cut at the frequency that was heard: the frequencies of their modes are
@@ -48,90 +132,40 @@ void SpeedSearch::draw() {
   const HeardCut& first = cuts_.front();
   std::mt19937_64 random(options_.seed + batches_++);
   const std::size_t wanted = machines_.size() + options_.machines;
-  std::uniform_real_distribution<double> unit;
-  const auto logUniform = [&](double low, double high) { return low * std::pow(high / low, unit(random)); };
+  const OtherFrequency others(cuts_, options_.frequency_error);
   for (std::size_t i = 0; i < MOST_DRAWS * options_.machines && machines_.size() < wanted; ++i) {
-    const auto damping = [&] { return logUniform(options_.low_damping, options_.high_damping); };
-    const auto sign = [&] { return unit(random) < BACKWARDS ? -1.0 : 1.0; };
-    std::vector<Mode> modes{{1.0, damping(), sign()}};
-    // The same bending in the other direction, and other modes.
-    if (unit(random) < SAME_BENDING)
-      modes.push_back({logUniform(0.8, 1.25), damping(), sign() * logUniform(0.2, 2.0)});
-    for (int other = 0; other < 2; ++other)
-      if (unit(random) < OTHER_MODE)
-        modes.push_back({logUniform(0.4, 3.0), damping(), sign() * logUniform(0.05, 1.0)});
-    const std::vector<Point> points = pointsOf(modes);
-    double scale = *first.frequency;
-    std::pair<double, double> limit;
+    const RegenerativeProcess process = drawProcess(random);
+    double weight = 1.0;
+    const ZeroOrderLobes lobes(process, drawResponse(options_, others, random, weight));
+    if (weight == 0.0) continue;
+    // Frequencies times a factor: the limits are those at the speeds divided by it.
+    double scale = *first.frequency, limit = 0.0, frequency = 0.0;
     for (int k = 0; k < ATTEMPTS; ++k) {
-      limit = limitAt(points, scale, first.speed);
-      if (std::isinf(limit.first)) break;
-      scale *= *first.frequency / limit.second;
+      const StabilityLimit at = lobes.limit({teeth_ * first.speed / scale});
+      limit = at.depth.front();
+      frequency = scale * at.chatter_frequency.front();
+      if (std::isinf(limit)) break;
+      scale *= *first.frequency / frequency;
     }
-    if (std::isinf(limit.first) || std::abs(limit.second / *first.frequency - 1.0) > options_.frequency_error)
+    if (std::isinf(limit) || std::abs(frequency / *first.frequency - 1.0) > options_.frequency_error)
       continue;
+    std::vector<double> passing;
+    for (const double speed : speeds_) passing.push_back(teeth_ * speed / scale);
+    StabilityLimit limits = lobes.limit(passing);
+    const double deepest = *std::max_element(limits.depth.begin(), limits.depth.end()) / limit;
+    if (deepest < 1.0) continue;
+    for (double& f : limits.chatter_frequency) f *= scale;
     Machine machine;
-    machine.depth = limit.first * logUniform(1.0, options_.largest_ratio);
-    for (std::size_t s = 0; s < speeds_; ++s) {
-      const auto [depth, frequency] = limitAt(points, scale, speedAt(s));
-      machine.limit.push_back(depth);
-      machine.frequency.push_back(frequency);
-    }
+    machine.depth = limit * logUniform(1.0, std::min(deepest, options_.largest_ratio), random);
+    machine.limit = std::move(limits.depth);
+    machine.frequency = std::move(limits.chatter_frequency);
+    machine.weight = weight;
     for (const HeardCut& cut : cuts_) machine.weight *= likelihoodOf(machine, cut);
     machines_.push_back(std::move(machine));
   }
   if (machines_.empty())
     throw Error(formatted("speed search: chatter at %.0f Hz at %.0f rpm: no machine has that",
                           *first.frequency, units::rpmFromRadPerSec(first.speed)));
-}
-
-/// Limit and phase between the waves of consecutive teeth over the frequency.
-std::vector<SpeedSearch::Point> SpeedSearch::pointsOf(const std::vector<Mode>& modes) {
-  std::vector<double> frequencies;
-  const auto lines = static_cast<double>(LINES) / static_cast<double>(modes.size());
-  for (const Mode& mode : modes)
-    for (double k = 0.5; k < lines; k += 1.0) {
-      // Quantiles of a Cauchy distribution about the mode, as wide as its resonance and wider.
-      const double f = mode.frequency * (1.0 + 1.5 * mode.damping * std::tan(units::PI * (k / lines - 0.5)));
-      if (f > 0.3 * mode.frequency && f < 3.0 * mode.frequency) frequencies.push_back(f);
-    }
-  std::sort(frequencies.begin(), frequencies.end());
-  std::vector<Point> points;
-  for (const double f : frequencies) {
-    std::complex<double> g = 0.0;
-    for (const Mode& mode : modes) {
-      const double r = f / mode.frequency;
-      g += mode.flexibility / std::complex<double>(1.0 - r * r, 2.0 * mode.damping * r);
-    }
-    const double limit = g.real() < 0.0 ? -0.5 / g.real() : std::numeric_limits<double>::infinity();
-    const double phase = units::PI + 2.0 * std::atan2(g.imag(), g.real());  // modulo 2 pi
-    const double before = points.empty() ? phase : points.back().phase;
-    points.push_back({f, limit, before + std::remainder(phase - before, units::TWO_PI)});
-  }
-  return points;
-}
-
-/// Least limit over the frequencies at which the phase between consecutive waves is that of the tooth passing
-/// period, and its frequency [Hz]. @param scale [Hz] of the frequencies of the points
-std::pair<double, double> SpeedSearch::limitAt(const std::vector<Point>& points, double scale,
-                                               double speed) const {
-  const double period = units::TWO_PI / (teeth_ * speed);
-  std::pair<double, double> least{std::numeric_limits<double>::infinity(), scale};
-  for (std::size_t k = 1; k < points.size(); ++k) {
-    const Point &a = points[k - 1], &b = points[k];
-    if (std::min(a.limit, b.limit) >= least.first) continue;
-    const double from = units::TWO_PI * scale * a.frequency * period - a.phase,
-                 to = units::TWO_PI * scale * b.frequency * period - b.phase;
-    // Whether a multiple of a turn lies between.
-    const double turn = std::ceil(std::min(from, to) / units::TWO_PI) * units::TWO_PI;
-    if (turn > std::max(from, to)) continue;
-    const double share = to != from ? (turn - from) / (to - from) : 0.5;
-    const double limit = std::isinf(a.limit)   ? b.limit
-                         : std::isinf(b.limit) ? a.limit
-                                               : a.limit + share * (b.limit - a.limit);
-    if (limit < least.first) least = {limit, scale * (a.frequency + share * (b.frequency - a.frequency))};
-  }
-  return least;
 }
 
 double SpeedSearch::likelihoodOf(const Machine& machine, const HeardCut& cut) const {
@@ -182,10 +216,10 @@ std::vector<SpeedProposal> SpeedSearch::proposals() const {
   if (machines_.empty()) return result;
   double all = 0.0;
   for (const Machine& machine : machines_) all += machine.weight;
-  for (std::size_t s = 0; s < speeds_; ++s) {
-    SpeedProposal proposal{speedAt(s), 0.0};
+  for (std::size_t s = 0; s < speeds_.size(); ++s) {
+    SpeedProposal proposal{speeds_[s], 0.0};
     for (const Machine& machine : machines_)
-      if (!(machine.depth > machine.limit[s])) proposal.stable += machine.weight / all;
+      if (machine.depth <= machine.limit[s]) proposal.stable += machine.weight / all;
     proposal.stable += RULE * (followsRule(proposal.speed) - proposal.stable);
     for (const HeardCut& cut : cuts_)
       if (cut.frequency && std::abs(cut.speed / proposal.speed - 1.0) < 1.5 * SPEED_STEP)

@@ -48,23 +48,13 @@ struct LobePoint {
 LobePoint lobePoint(Complex g) {
   // 1 / (b g) = 1 - exp(-i theta) lies on the circle of radius 1 around 1, so b = |1 / g|^2 / (2 Re(1 / g))
   // with Re(1 / g) > 0.
+  if (g == Complex(0.0)) return {std::numeric_limits<double>::infinity(), 0.0};
   const Complex inverse = 1.0 / g;
   const double depth = std::norm(inverse) / (2.0 * inverse.real());
   if (!(depth > 0.0) || !std::isfinite(depth)) return {std::numeric_limits<double>::infinity(), 0.0};
   double phase = -std::arg(1.0 - inverse / depth);
   if (phase <= 0.0) phase += TWO_PI;
   return {depth, phase};
-}
-
-std::vector<LobePoint> lobe(const RegenerativeProcess& process, const std::vector<Complex>& branch) {
-  const double factor = process.kt * process.teeth / (4.0 * PI);
-  std::vector<LobePoint> points;
-  points.reserve(branch.size());
-  for (const Complex& lambda : branch) {
-    points.push_back(lambda == Complex(0.0) ? LobePoint{std::numeric_limits<double>::infinity(), 0.0}
-                                            : lobePoint(factor * lambda));
-  }
-  return points;
 }
 
 }  // namespace
@@ -157,8 +147,25 @@ ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& 
   return response;
 }
 
-StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
-                              const std::vector<double>& speeds) {
+ZeroOrderLobes::ZeroOrderLobes(const RegenerativeProcess& process, const ToolTipResponse& tool)
+    : teeth_(process.teeth) {
+  const double factor = process.kt * process.teeth / (4.0 * PI);
+  for (const std::vector<Complex>& branch : eigenvalues(process, tool)) {
+    LobePoint before{std::numeric_limits<double>::infinity(), 0.0};
+    for (std::size_t i = 0; i < branch.size(); ++i) {
+      LobePoint now = lobePoint(factor * branch[i]);
+      absolute_ = std::min(absolute_, now.depth);
+      if (std::isfinite(before.depth) && std::isfinite(now.depth)) {
+        const double phase = before.phase + std::remainder(now.phase - before.phase, TWO_PI);
+        segments_.push_back({TWO_PI * tool.frequency[i - 1], TWO_PI * tool.frequency[i], before.phase, phase,
+                             before.depth, now.depth});
+      }
+      before = now;
+    }
+  }
+}
+
+StabilityLimit ZeroOrderLobes::limit(const std::vector<double>& speeds) const {
   StabilityLimit limit;
   limit.spindle_speed = speeds;
   limit.depth.assign(speeds.size(), std::numeric_limits<double>::infinity());
@@ -169,31 +176,23 @@ StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipR
     }
   }
   if (speeds.empty()) return limit;
-  for (const std::vector<Complex>& branch : eigenvalues(process, tool)) {
-    const std::vector<LobePoint> points = lobe(process, branch);
-    for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-      LobePoint from = points[i], to = points[i + 1];
-      if (!std::isfinite(from.depth) || !std::isfinite(to.depth)) continue;
-      if (to.phase - from.phase > PI) to.phase -= TWO_PI;
-      if (from.phase - to.phase > PI) to.phase += TWO_PI;
-      const double w1 = TWO_PI * tool.frequency[i], w2 = TWO_PI * tool.frequency[i + 1];
-      // Lobe j: w T = phase + 2 pi j, spindle speed 2 pi / (teeth T).
-      const auto speedOf = [&](double w, double phase, int j) {
-        return TWO_PI * w / (process.teeth * (phase + TWO_PI * j));
-      };
-      const int last = static_cast<int>(std::max(w1, w2) / (process.teeth * speeds.front())) + 2;
-      for (int j = 0; j <= last; ++j) {
-        if (from.phase + TWO_PI * j <= 0.0 || to.phase + TWO_PI * j <= 0.0) continue;
-        const double n1 = speedOf(w1, from.phase, j), n2 = speedOf(w2, to.phase, j);
-        auto speed = std::lower_bound(speeds.begin(), speeds.end(), std::min(n1, n2));
-        for (; speed != speeds.end() && *speed <= std::max(n1, n2); ++speed) {
-          const double share = n1 == n2 ? 0.0 : (*speed - n1) / (n2 - n1);
-          const double depth = from.depth + share * (to.depth - from.depth);
-          const auto k = static_cast<std::size_t>(speed - speeds.begin());
-          if (depth < limit.depth[k]) {
-            limit.depth[k] = depth;
-            limit.chatter_frequency[k] = (w1 + share * (w2 - w1)) / TWO_PI;
-          }
+  for (const Segment& s : segments_) {
+    // Lobe j: w T = phase + 2 pi j, spindle speed 2 pi / (teeth T).
+    const auto speedOf = [&](double w, double phase, int j) {
+      return TWO_PI * w / (teeth_ * (phase + TWO_PI * j));
+    };
+    const int last = static_cast<int>(std::max(s.w1, s.w2) / (teeth_ * speeds.front())) + 2;
+    for (int j = 0; j <= last; ++j) {
+      if (s.phase1 + TWO_PI * j <= 0.0 || s.phase2 + TWO_PI * j <= 0.0) continue;
+      const double n1 = speedOf(s.w1, s.phase1, j), n2 = speedOf(s.w2, s.phase2, j);
+      auto speed = std::lower_bound(speeds.begin(), speeds.end(), std::min(n1, n2));
+      for (; speed != speeds.end() && *speed <= std::max(n1, n2); ++speed) {
+        const double share = n1 == n2 ? 0.0 : (*speed - n1) / (n2 - n1);
+        const double depth = s.depth1 + share * (s.depth2 - s.depth1);
+        const auto k = static_cast<std::size_t>(speed - speeds.begin());
+        if (depth < limit.depth[k]) {
+          limit.depth[k] = depth;
+          limit.chatter_frequency[k] = (s.w1 + share * (s.w2 - s.w1)) / TWO_PI;
         }
       }
     }
@@ -201,12 +200,13 @@ StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipR
   return limit;
 }
 
+StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
+                              const std::vector<double>& speeds) {
+  return ZeroOrderLobes(process, tool).limit(speeds);
+}
+
 double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const std::vector<Complex>& branch : eigenvalues(process, tool)) {
-    for (const LobePoint& point : lobe(process, branch)) least = std::min(least, point.depth);
-  }
-  return least;
+  return ZeroOrderLobes(process, tool).absolute();
 }
 
 }  // namespace smartmill::stability

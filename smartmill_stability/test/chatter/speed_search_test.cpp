@@ -72,6 +72,17 @@ TEST(SpeedSearch, findsAStableSpeedOfASimulatedMachine) {
   EXPECT_LE(tries, 4);
 }
 
+// The rpm 2 % around the first cut: some speed is stable in every drawn machine, however narrow the range is.
+TEST(SpeedSearch, aNarrowRangeHasProposals) {
+  const double first = units::radPerSecFromRpm(9000.0);
+  SpeedSearch search(TEETH, 0.98 * first, 1.02 * first);
+  search.heard({first, 1000.0});
+  const SpeedProposal next = search.next();
+  EXPECT_GE(next.speed, 0.98 * first);
+  EXPECT_LE(next.speed, 1.02 * first * (1.0 + 1e-12));
+  EXPECT_GT(next.stable, 0.1);
+}
+
 TEST(SpeedSearch, theSameCutsGiveTheSameProposals) {
   SpeedSearch a(TEETH, LOW, HIGH), b(TEETH, LOW, HIGH);
   for (SpeedSearch* search : {&a, &b}) {

@@ -45,13 +45,31 @@ ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& 
 /// tool and forces on the tool.
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process);
 
-/// Zero-order solution of Altintas and Budak (Dunwoody eq. 6.10..6.14): at each speed the smallest depth over
-/// all lobes and both eigenvalues, interpolated between the lines. @param speeds [rad/s] > 0, ascending
+/// Zero-order solution of Altintas and Budak (Dunwoody eq. 6.10..6.14): the lobes of both eigenvalues,
+/// interpolated between the lines.
+class ZeroOrderLobes {
+ public:
+  ZeroOrderLobes(const RegenerativeProcess& process, const ToolTipResponse& tool);
+
+  /// At each speed the smallest depth over all lobes. @param speeds [rad/s] > 0, ascending
+  StabilityLimit limit(const std::vector<double>& speeds) const;
+  /// [m] Critical limit: below this depth every speed is stable; +inf without a limit.
+  double absolute() const { return absolute_; }
+
+ private:
+  struct Segment {
+    double w1, w2, phase1, phase2, depth1, depth2;  // [rad/s], [rad] w T modulo 2 pi, [m] at both ends
+  };
+  int teeth_;
+  std::vector<Segment> segments_;
+  double absolute_ = std::numeric_limits<double>::infinity();
+};
+
+/// ZeroOrderLobes::limit().
 StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
                               const std::vector<double>& speeds);
 
-/// [m] Critical limit: below this depth every speed is stable by the zero-order solution; +inf without a
-/// limit.
+/// ZeroOrderLobes::absolute().
 double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool);
 
 }  // namespace smartmill::stability
