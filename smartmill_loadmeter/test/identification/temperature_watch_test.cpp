@@ -42,6 +42,14 @@ TEST(TemperatureWatch, meanOfTheReadingsDuringATest) {
   EXPECT_EQ(watch.fault(146.0), "");
 }
 
+// A node that runs for weeks needs the readings of the running test only.
+TEST(TemperatureWatch, readingsOlderThanFourHoursAreForgotten) {
+  TemperatureWatch watch({});
+  for (double t = 0.0; t < 18000.0; t += 5.0) watch.handle(at(t, 310.0));
+  EXPECT_DOUBLE_EQ(watch.spindle(4000.0, 17000.0).value, 310.0);
+  EXPECT_FALSE(watch.spindle(1000.0, 2000.0).known());
+}
+
 TEST(TemperatureWatch, missingIsUnknownAndNotAFault) {
   TemperatureWatch watch({});
   EXPECT_FALSE(watch.spindle(100.0, 110.0).known());
