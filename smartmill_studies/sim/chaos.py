@@ -163,7 +163,8 @@ def run(seed, arguments):
             observer.produce()
             time.sleep(0.05)
         if observer.missing():
-            raise RuntimeError("the graph does not start: " + ", ".join(observer.missing()))
+            errors = [line for line in (folder / "log.txt").read_text(errors="replace").splitlines() if line.startswith("ERROR")]
+            raise RuntimeError("; ".join(["the graph does not start: " + ", ".join(observer.missing()), *errors[:1]]))
         faults = Faults(seed, observer, graph)
         begin, first_stamp = time.monotonic(), observer.rospy.Time.now().to_sec()
         stamps, pending, is_over, pause = [], None, None, faults.random.expovariate(1.0 / MEAN_PAUSE)

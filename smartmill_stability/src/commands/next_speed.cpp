@@ -72,7 +72,7 @@ void run(const Request& request) {
   const std::vector<SpeedProposal> best = bestProposals(search.proposals());
   if (best.empty()) throw Error("no cut with chatter was heard: expected one at least");
   const SpeedProposal next = search.next();
-  std::printf("next: %.0f rpm, stable with a probability of %.0f %% at the same depth\n",
+  std::printf("next: %.0f rpm, stable with a probability of %.0f %% at the same depth if any speed is\n",
               units::rpmFromRadPerSec(next.speed), 100.0 * next.stable);
   for (const SpeedProposal& p : best)
     std::printf("  %6.0f rpm  %3.0f %%\n", units::rpmFromRadPerSec(p.speed), 100.0 * p.stable);
