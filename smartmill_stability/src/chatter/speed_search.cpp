@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "learning/geometric_grid.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
@@ -93,12 +94,8 @@ ToolTipResponse drawResponse(const SpeedSearchOptions& options, const OtherFrequ
   ToolTipResponse response;
   for (const ModalModel& axis : axes)
     for (const Mode& mode : axis.modes)
-      for (int k = 0; k < LINES; ++k) {
-        // Quantiles of a Cauchy distribution about the mode, as wide as its resonance and wider.
-        const double share = (k + 0.5) / LINES - 0.5;
-        const double f = mode.frequency * (1.0 + 1.5 * mode.damping_ratio * std::tan(units::PI * share));
-        if (f > 0.3 * mode.frequency && f < 3.0 * mode.frequency) response.frequency.push_back(f);
-      }
+      for (const double f : linesAround(mode.frequency, mode.damping_ratio, LINES))
+        response.frequency.push_back(f);
   std::sort(response.frequency.begin(), response.frequency.end());
   for (const double f : response.frequency) {
     response.xx.push_back(axes[0].response(f));
@@ -110,18 +107,16 @@ ToolTipResponse drawResponse(const SpeedSearchOptions& options, const OtherFrequ
 }  // namespace
 
 SpeedSearch::SpeedSearch(int teeth, double low, double high, const SpeedSearchOptions& options)
-    : teeth_(teeth), low_(low), high_(high), options_(options) {
+    : teeth_(teeth), options_(options) {
   if (teeth < 1 || teeth > 40) throw Error(formatted("speed search: %d teeth: expected 1 to 40", teeth));
   if (!(low > 0.0) || !(high > low) || !std::isfinite(high))
     throw Error(formatted("speed search: speeds %g to %g rad/s: expected 0 < low < high", low, high));
-  const auto steps = static_cast<std::size_t>(std::ceil(std::log(high / low) / std::log1p(SPEED_STEP)));
-  for (std::size_t k = 0; k <= steps; ++k)
-    speeds_.push_back(low * std::pow(high / low, static_cast<double>(k) / static_cast<double>(steps)));
+  speeds_ = geometricGrid(low, high, SPEED_STEP);
 }
 
 std::size_t SpeedSearch::nearest(double speed) const {
   const auto last = static_cast<double>(speeds_.size() - 1);
-  const double at = std::log(speed / low_) / std::log(high_ / low_) * last;
+  const double at = std::log(speed / speeds_.front()) / std::log(speeds_.back() / speeds_.front()) * last;
   return static_cast<std::size_t>(std::lround(std::clamp(at, 0.0, last)));
 }
 
@@ -188,10 +183,11 @@ void SpeedSearch::heard(const HeardCut& cut) {
   if (!(cut.speed > 0.0) || !std::isfinite(cut.speed))
     throw Error(formatted("speed search: cut at %g rad/s: expected a speed above 0", cut.speed));
   constexpr double ROUNDING = 1e-6;
-  if (cut.speed < low_ * (1.0 - ROUNDING) || cut.speed > high_ * (1.0 + ROUNDING))
+  const double low = speeds_.front(), high = speeds_.back();
+  if (cut.speed < low * (1.0 - ROUNDING) || cut.speed > high * (1.0 + ROUNDING))
     throw Error(formatted("speed search: cut at %.0f rpm: expected a speed of the range, %.0f to %.0f rpm",
-                          units::rpmFromRadPerSec(cut.speed), units::rpmFromRadPerSec(low_),
-                          units::rpmFromRadPerSec(high_)));
+                          units::rpmFromRadPerSec(cut.speed), units::rpmFromRadPerSec(low),
+                          units::rpmFromRadPerSec(high)));
   if (cut.frequency && (!(*cut.frequency > 0.0) || !std::isfinite(*cut.frequency)))
     throw Error(formatted("speed search: chatter at %g Hz: expected a frequency above 0", *cut.frequency));
   if (cuts_.empty() && !cut.frequency)

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "learning/geometric_grid.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/normal.h"
 #include "smartmill_core/require.h"
@@ -21,7 +22,7 @@ constexpr double SPEED_STEP = 0.015;     // [1] between speeds of the grid
 constexpr double DEPTH_STEP = 0.06;      // [1] between depths of the grid
 constexpr double LEAST_DEPTH = 0.01;     // [1] of the largest
 constexpr double SAME_SPEED = 0.002;     // [1] of a cut that was made
-constexpr double LINES = 24.0;           // frequencies of a mode, dense around it
+constexpr int LINES = 24;                // frequencies of a mode, dense around it
 constexpr double FREQUENCY_RANGE = 3.0;  // [1] of the logarithm of chatter frequencies, 200 Hz .. 4 kHz
 constexpr int EXAMINED = 12;             // most cuts that collocation judges for a recommendation
 constexpr double LOOSE = 2.0;  // [1] probability of chatter over the risk, up to which a cut is examined
@@ -37,30 +38,16 @@ std::unique_ptr<FloquetSolver> solverOf(const RegenerativeSystem& machine) {
   return makeFloquetSolver(Method::collocation, machine, verdictOptions());
 }
 
-/// Zero-order limits at ascending speeds [rad/s]; lines at quantiles of a Cauchy distribution about each
-/// mode.
+/// Zero-order limits at ascending speeds [rad/s].
 StabilityLimit zeroOrderOf(const RegenerativeSystem& machine, const std::vector<double>& speeds) {
   std::vector<double> frequencies;
   for (const SystemMode& mode : machine.modes)
-    for (double k = 0.5; k < LINES; k += 1.0) {
-      const double f =
-          mode.frequency * (1.0 + 1.5 * mode.damping_ratio * std::tan(units::PI * (k / LINES - 0.5)));
-      if (f > 0.3 * mode.frequency && f < 3.0 * mode.frequency) frequencies.push_back(f);
-    }
+    for (const double f : linesAround(mode.frequency, mode.damping_ratio, LINES)) frequencies.push_back(f);
   std::sort(frequencies.begin(), frequencies.end());
   frequencies.erase(std::unique(frequencies.begin(), frequencies.end()), frequencies.end());
   const RegenerativeProcess process{machine.teeth, machine.entry, machine.exit, machine.kt,
                                     machine.kr / machine.kt};
   return zeroOrderLimit(process, responseOf(machine.modes, std::move(frequencies)), speeds);
-}
-
-std::vector<double> geometric(double low, double high, double step) {
-  const auto count = static_cast<std::size_t>(std::ceil(std::log(high / low) / std::log1p(step))) + 1;
-  std::vector<double> values;
-  for (std::size_t k = 0; k < count; ++k)
-    values.push_back(low * std::pow(high / low, static_cast<double>(k) / static_cast<double>(count - 1)));
-  values.back() = high;
-  return values;
 }
 
 /// [1] Standard deviation of a share of a count, with half a machine on either side.
@@ -117,8 +104,8 @@ ChartLearning::ChartLearning(const MachinePrior& prior, const CutRange& range, c
   options_.validate();
   if (options_.risk < options_.wrong)
     throw Error("risk: expected at least the probability of a wrong verdict");
-  speeds_ = geometric(range.speed_low, range.speed_high, SPEED_STEP);
-  depths_ = geometric(LEAST_DEPTH * range.max_depth, range.max_depth, DEPTH_STEP);
+  speeds_ = geometricGrid(range.speed_low, range.speed_high, SPEED_STEP);
+  depths_ = geometricGrid(LEAST_DEPTH * range.max_depth, range.max_depth, DEPTH_STEP);
   for (const double speed : speeds_)
     most_.push_back(range.depth_limit ? std::min(range.max_depth, range.depth_limit(speed))
                                       : range.max_depth);

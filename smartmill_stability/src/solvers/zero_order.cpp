@@ -88,6 +88,15 @@ void RegenerativeProcess::validate() const {
   require("radial ratio", radial_ratio, Range{});  // below 0 at the tip of a ball end
 }
 
+std::vector<double> linesAround(double frequency, double damping_ratio, int lines) {
+  std::vector<double> result;
+  for (double k = 0.5; k < lines; k += 1.0) {
+    const double f = frequency * (1.0 + 1.5 * damping_ratio * std::tan(PI * (k / lines - 0.5)));
+    if (f > 0.3 * frequency && f < 3.0 * frequency) result.push_back(f);
+  }
+  return result;
+}
+
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process) {
   process.validate();
   // Integrals over the immersion of -cos - r sin and sin - r cos (force on the tool per Kt h) times sin and

@@ -72,7 +72,8 @@ TEST(SpeedSearch, findsAStableSpeedOfASimulatedMachine) {
   EXPECT_LE(tries, 4);
 }
 
-// The rpm 2 % around the first cut: some speed is stable in every drawn machine, however narrow the range is.
+// A range of 2 % to both sides of the first cut: some speed is stable in every drawn machine, however narrow
+// the range is.
 TEST(SpeedSearch, aNarrowRangeHasProposals) {
   const double first = units::radPerSecFromRpm(9000.0);
   SpeedSearch search(TEETH, 0.98 * first, 1.02 * first);

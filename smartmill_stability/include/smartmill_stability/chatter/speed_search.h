@@ -69,9 +69,8 @@ class SpeedSearch {
   std::size_t nearest(double speed) const;
 
   int teeth_;
-  double low_, high_;
   SpeedSearchOptions options_;
-  std::vector<double> speeds_;  // [rad/s] grid
+  std::vector<double> speeds_;  // [rad/s] grid over the range of the spindle
   std::uint64_t batches_ = 0;
   std::vector<Machine> machines_;
   std::vector<HeardCut> cuts_;

@@ -40,6 +40,10 @@ ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low,
 /// do not overlap.
 ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y);
 
+/// Lines [Hz] dense about a mode: quantiles of a Cauchy distribution as wide as its resonance and wider, of
+/// these the ones from 0.3 to 3 times its frequency. Ascending.
+std::vector<double> linesAround(double frequency, double damping_ratio, int lines);
+
 /// Mean directional coefficients a_xx, a_xy, a_yx, a_yy over a revolution times 2 pi / teeth, so that A_0 =
 /// teeth / (2 pi) x these (Dunwoody eq. 6.3..6.9, where the second a_xx is a_yy), for [x, y] vibration of the
 /// tool and forces on the tool.
